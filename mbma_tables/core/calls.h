@@ -1,7 +1,9 @@
-/* The core's functions as a table of their arguments, for `binding.c` and for tests without Python.
+/* The core's functions as functions of a list of arguments, for `binding.c` and for tests without
+ * Python.
  *
- * Sizes of arrays are checked here, and once a call whatever the loops use as a number of a node, a cell or a record
- * without a check of their own. Of all other values, NaN and infinities included, the core makes results or a status.
+ * Sizes of arrays are checked here, and once a call whatever the loops use as a number of a node, a
+ * cell or a record without a check of their own. Of all other values, NaN and infinities included,
+ * the core makes results or a status.
  */
 #ifndef MBMA_CALLS_H
 #define MBMA_CALLS_H
@@ -11,210 +13,643 @@
 
 enum { MOST_ARGUMENTS = 24 };
 
-/* An argument: a number, or the items of an array; `data` is NULL where None was given. */
+/* An argument: a number, or the items of an array; `items` is NULL where None was given. */
 typedef struct {
-    double d;
-    int64_t i;
-    void *data;
-    size_t n;
+    double real;
+    int64_t whole;
+    void *items;
+    size_t count;
 } argument;
 
-/* Of an argument its items, how many, a double, a whole number; how many doubles a structure has. */
-#define P(k) a[k].data
-#define N(k) a[k].n
-#define X(k) a[k].d
-#define I(k) a[k].i
+/* How many doubles a structure has. */
 #define WORDS(type) (sizeof(type) / sizeof(double))
-
-/* Elementary functions of an array, for their test against mpmath. */
-static size_t elementary(int64_t which, size_t n, const double *x, double *out) {
-    for (size_t k = 0; k < n; k++)
-        out[k] = which == 0 ? mbma_exp(x[k]) : which == 1 ? mbma_expm1(x[k]) : which == 2 ? mbma_log(x[k])
-                 : which == 3 ? mbma_log1p(x[k]) : mbma_erf(x[k]);
-    return 0;
-}
 
 /* A sum of no more than two such numbers does not overflow. */
 #define MODEST (INT64_C(1) << 62)
 static bool is_modest(int64_t number) { return -MODEST < number && number < MODEST; }
 
-/* The universal table from three arrays: cells, places, and X_low, X_high, X_rate, mu_high, first_bucket, buckets.
- * Whether every strip of X in the range has a place, from which on there is one for each bucket of mu, and whether
- * these are numbers of cells. */
-static bool is_table(const argument *a) {
-    const double *const n = P(2), strips = (n[1] - n[0]) * n[2];
-    const int32_t *const places = P(1);
-    const size_t count = N(1) < INT32_MAX ? N(1) : INT32_MAX, cells = N(0) / WORDS(mbma_cell);
-    /* not so if one of them is NaN */
-    if (!(fabs(n[0]) < INFINITY && n[2] > 0.0 && strips >= 0.0 && strips < (double)count && fabs(n[4]) < 65536.0 &&
-          n[5] >= 1.0 && n[5] < (double)count))
+/* ---- elementary.h ---- */
+
+enum { ELEMENTARY_EXP, ELEMENTARY_EXPM1, ELEMENTARY_LOG, ELEMENTARY_LOG1P, ELEMENTARY_ERF };
+
+static double elementary_at(int64_t which, double x) {
+    switch (which) {
+    case ELEMENTARY_EXP:
+        return mbma_exp(x);
+    case ELEMENTARY_EXPM1:
+        return mbma_expm1(x);
+    case ELEMENTARY_LOG:
+        return mbma_log(x);
+    case ELEMENTARY_LOG1P:
+        return mbma_log1p(x);
+    default:
+        return mbma_erf(x);
+    }
+}
+
+/* Elementary functions of an array, for their test against mpmath. */
+static bool do_elementary(const argument *a, long long *answer) {
+    enum { WHICH, X, VALUES };
+    const double *const x = a[X].items;
+    double *const values = a[VALUES].items;
+    for (size_t k = 0; k < a[X].count; k++)
+        values[k] = elementary_at(a[WHICH].whole, x[k]);
+    *answer = 0;
+    return true;
+}
+
+/* ---- totals.c ---- */
+
+/* The universal table is three arguments. */
+enum { TABLE_CELLS, TABLE_PLACES, TABLE_NUMBERS, TABLE_ARGUMENTS };
+#define TABLE "D J D6 "
+
+/* The third of them. */
+typedef struct {
+    double X_low, X_high, X_rate, mu_high, first_bucket, buckets;
+} table_numbers;
+
+/* A bucket of mu is the number that its leading 15 bits make (`BUCKET_BITS` of phi.h). */
+static const double BUCKETS_OF_ALL_FLOATS = 65536.0;
+
+/* Whether every strip of X in the range has a place, from which on there is one for each bucket of
+ * mu, and whether these are numbers of cells. */
+static bool is_table(const argument *table) {
+    const table_numbers *const numbers = table[TABLE_NUMBERS].items;
+    const int32_t *const places = table[TABLE_PLACES].items;
+    const size_t all_places = table[TABLE_PLACES].count;
+    const size_t count = all_places < INT32_MAX ? all_places : INT32_MAX;
+    const size_t cells = table[TABLE_CELLS].count / WORDS(mbma_cell);
+    const double strips = (numbers->X_high - numbers->X_low) * numbers->X_rate;
+    /* false if one of them is NaN */
+    const bool strips_fit = fabs(numbers->X_low) < INFINITY && numbers->X_rate > 0.0 &&
+                            strips >= 0.0 && strips < (double)count;
+    const bool buckets_fit = fabs(numbers->first_bucket) < BUCKETS_OF_ALL_FLOATS &&
+                             numbers->buckets >= 1.0 && numbers->buckets < (double)count;
+    if (!strips_fit || !buckets_fit)
         return false;
-    const size_t starts = (size_t)strips + 1, buckets = (size_t)n[5];
+
+    /* first are the places where the buckets of each strip begin, then the cells of all buckets */
+    const size_t starts = (size_t)strips + 1;
+    const size_t buckets = (size_t)numbers->buckets;
     if (starts + buckets > count)
         return false;
-    const uint32_t begin = (uint32_t)starts, room = (uint32_t)(count - buckets - starts);
-    const uint32_t last = (uint32_t)(cells < INT32_MAX ? cells : INT32_MAX);
+    const uint32_t first_start = (uint32_t)starts;
+    const uint32_t room_for_starts = (uint32_t)(count - buckets - starts);
+    const uint32_t cell_count = (uint32_t)(cells < INT32_MAX ? cells : INT32_MAX);
+
     /* without a branch, so that this is vectorised; negative places are large ones here */
     uint32_t wrong = 0;
     for (size_t k = 0; k < starts; k++)
-        wrong |= (uint32_t)((uint32_t)places[k] - begin > room);
+        wrong |= (uint32_t)((uint32_t)places[k] - first_start > room_for_starts);
     for (size_t k = starts; k < count; k++)
-        wrong |= (uint32_t)((uint32_t)places[k] >= last);
+        wrong |= (uint32_t)((uint32_t)places[k] >= cell_count);
     return wrong == 0;
 }
-static mbma_cells cells_of(const argument *a) {
-    const double *const n = P(2);
-    return (mbma_cells){P(0), P(1), n[0], n[1], n[2], n[3], (int64_t)n[4], (int64_t)n[5]};
-}
-#define CELLS(k) ((const mbma_cells[]){cells_of(a + (k))})
 
-/* From density_divisor, beta, phi, floor_d, floor_u, offset, summit_sigma, printed. */
+static mbma_cells cells_of(const argument *table) {
+    const table_numbers *const numbers = table[TABLE_NUMBERS].items;
+    return (mbma_cells){
+        .cells = table[TABLE_CELLS].items,
+        .places = table[TABLE_PLACES].items,
+        .X_low = numbers->X_low,
+        .X_high = numbers->X_high,
+        .X_rate = numbers->X_rate,
+        .mu_high = numbers->mu_high,
+        .first_bucket = (int64_t)numbers->first_bucket,
+        .buckets = (int64_t)numbers->buckets,
+    };
+}
+
+/* A variant as an argument. */
+typedef struct {
+    double density_divisor, beta, phi, floor_d, floor_u, offset, summit_sigma, printed;
+} variant_numbers;
+
 static mbma_variant variant_of(const argument *a) {
-    const double *const n = a->data;
-    return (mbma_variant){n[0], n[1], n[2], n[3], n[4], n[5] != 0.0, n[6] != 0.0, n[7] != 0.0};
+    const variant_numbers *const numbers = a->items;
+    return (mbma_variant){
+        .density_divisor = numbers->density_divisor,
+        .beta = numbers->beta,
+        .phi = numbers->phi,
+        .floor_d = numbers->floor_d,
+        .floor_u = numbers->floor_u,
+        .offset = numbers->offset != 0.0,
+        .summit_sigma = numbers->summit_sigma != 0.0,
+        .printed = numbers->printed != 0.0,
+    };
 }
-#define VARIANT(k) ((const mbma_variant[]){variant_of(a + (k))})
 
-enum { PLACES = MBMA_PANEL_NODES + MBMA_PANEL_CHECKS, SERIES_TERMS = 2 * MBMA_PANEL_GAPS };
-
-enum { RULES = 3 };
-
-/* The rules as one array, kinds, low and high ends and fields of panels, and how many rows these have. */
-static bool are_panels(const argument *a) {
-    const size_t panels = N(1);
-    const mbma_panel_rule *const rules = P(0);
-    const uint64_t *const kinds = P(1);
-    if (N(0) != RULES * WORDS(mbma_panel_rule) || I(5) < 2 || I(5) > MBMA_PANEL_ROWS ||
-        N(4) != (size_t)(I(5) + 2) * panels * PLACES)
+static bool do_phi(const argument *a, long long *answer) {
+    enum { X, MU, TABLE_AT, ROWS = TABLE_AT + TABLE_ARGUMENTS, STATUS };
+    if (!is_table(&a[TABLE_AT]))
         return false;
-    /* the error of a series is estimated from its last four terms */
-    const double most_nodes = MBMA_PANEL_NODES, most_gaps = MBMA_PANEL_GAPS;
-    for (int k = 0; k < RULES; k++)
-        if (!(rules[k].count >= 1.0 && rules[k].count <= most_nodes && rules[k].gaps >= 2.0 &&
-              rules[k].gaps <= most_gaps))
+    const mbma_cells cells = cells_of(&a[TABLE_AT]);
+    *answer = (long long)mbma_phi(a[X].count, a[X].items, a[MU].items, &cells, a[ROWS].items,
+                                  a[STATUS].items);
+    return true;
+}
+
+static bool do_totals(const argument *a, long long *answer) {
+    enum { HURST, ZETA_1, COMPRESSION, PEAK, RTOL, VARIANT, TABLE_AT };
+    enum { TOTALS = TABLE_AT + TABLE_ARGUMENTS, ERROR, STATUS, ISLANDS };
+    if (!is_table(&a[TABLE_AT]))
+        return false;
+    const mbma_variant variant = variant_of(&a[VARIANT]);
+    const mbma_cells cells = cells_of(&a[TABLE_AT]);
+    *answer = (long long)mbma_totals(a[HURST].count, a[HURST].items, a[ZETA_1].items,
+                                     a[COMPRESSION].items, a[PEAK].items, a[RTOL].real, &variant,
+                                     &cells, a[TOTALS].items, a[ERROR].items, a[STATUS].items,
+                                     a[ISLANDS].items);
+    return true;
+}
+
+static bool do_island_geometry(const argument *a, long long *answer) {
+    enum { APPROACH, HURST, ZETA_1, VARIANT, ISLAND };
+    if (a[ISLAND].count != WORDS(mbma_island))
+        return false;
+    const mbma_variant variant = variant_of(&a[VARIANT]);
+    *answer = mbma_island_geometry(a[APPROACH].real, a[HURST].real, a[ZETA_1].real, &variant,
+                                   a[ISLAND].items);
+    return true;
+}
+
+/* ---- profile.c ---- */
+
+enum { PANEL_RULES = 3, PANEL_PLACES = MBMA_PANEL_NODES + MBMA_PANEL_CHECKS };
+enum { SERIES_TERMS = 2 * MBMA_PANEL_GAPS };
+
+/* Panels as arguments: the rules as one array; kinds, low and high ends and fields of panels, and
+ * how many rows these have. */
+enum { RULES, KINDS, LOW, HIGH, FIELDS, ROWS_OF_FIELDS, PANEL_ARGUMENTS };
+#define PANELS "D Ln Dn Dn D i "
+
+static bool are_panels(const argument *a) {
+    const size_t panels = a[KINDS].count;
+    const mbma_panel_rule *const rules = a[RULES].items;
+    const uint64_t *const kinds = a[KINDS].items;
+    const int64_t rows = a[ROWS_OF_FIELDS].whole;
+    if (a[RULES].count != PANEL_RULES * WORDS(mbma_panel_rule))
+        return false;
+    if (rows < 2 || rows > MBMA_PANEL_ROWS)
+        return false;
+    /* beside its rows a field has shift and rate */
+    if (a[FIELDS].count != (size_t)(rows + 2) * panels * PANEL_PLACES)
+        return false;
+
+    const double most_nodes = MBMA_PANEL_NODES;
+    const double most_gaps = MBMA_PANEL_GAPS;
+    for (int k = 0; k < PANEL_RULES; k++) {
+        const bool nodes_fit = rules[k].count >= 1.0 && rules[k].count <= most_nodes;
+        /* the error of a series is estimated from its last four terms, those of two gaps */
+        const bool gaps_fit = rules[k].gaps >= 2.0 && rules[k].gaps <= most_gaps;
+        if (!nodes_fit || !gaps_fit)
             return false;
+    }
     for (size_t k = 0; k < panels; k++)
-        if (kinds[k] >= RULES)
+        if (kinds[k] >= PANEL_RULES)
             return false;
     return true;
 }
-#define NODES(k) ((const mbma_nodes[]){{(int64_t)N((k) + 1), P(k), P((k) + 1), P((k) + 2)}})
 
-#define BASIS(k) ((const mbma_basis[]){{N(k), P(k), P((k) + 1), P((k) + 2), P((k) + 3)}})
-#define LAW(k) ((const mbma_law[]){mbma_law_open(P(k), N(k))})
-/* Whether a block is that of a law, in which numbers of records are held between the first and the last one. */
-static bool is_law(const argument *a) {
-    const mbma_law law = mbma_law_open(a->data, a->n);
+static bool do_profile_islands(const argument *a, long long *answer) {
+    enum { X, PEAK, HURST, ZETA_1, VARIANT, TABLE_AT };
+    enum { ISLANDS = TABLE_AT + TABLE_ARGUMENTS, ERROR };
+    if (!is_table(&a[TABLE_AT]))
+        return false;
+    const mbma_variant variant = variant_of(&a[VARIANT]);
+    const mbma_cells cells = cells_of(&a[TABLE_AT]);
+    *answer = mbma_profile_islands(a[X].count, a[X].items, a[PEAK].real, a[HURST].real,
+                                   a[ZETA_1].real, &variant, &cells, a[ISLANDS].items,
+                                   a[ERROR].items);
+    return true;
+}
+
+static bool do_profile_missed(const argument *a, long long *answer) {
+    enum { LAST = PANEL_ARGUMENTS, ERROR };
+    if (!are_panels(a))
+        return false;
+    mbma_profile_missed(a[RULES].items, a[KINDS].count, a[KINDS].items, a[LOW].items, a[HIGH].items,
+                        a[FIELDS].items, (int)a[ROWS_OF_FIELDS].whole, a[LAST].real,
+                        a[ERROR].items);
+    *answer = 0;
+    return true;
+}
+
+static bool do_profile_series(const argument *a, long long *answer) {
+    enum { SERIES = PANEL_ARGUMENTS, ERROR, WEIGHTS, SHIFT, RATE, STOPS };
+    if (!are_panels(a))
+        return false;
+    const size_t panels = a[KINDS].count;
+    const size_t rows = (size_t)a[ROWS_OF_FIELDS].whole;
+    const size_t islands = a[SHIFT].count;
+    if (a[SERIES].count != panels * rows * SERIES_TERMS || a[STOPS].count != panels + 1)
+        return false;
+    if (islands != panels * MBMA_PANEL_NODES || a[WEIGHTS].count != rows * islands)
+        return false;
+
+    const mbma_nodes nodes = {
+        .size = (int64_t)islands,
+        .weights = a[WEIGHTS].items,
+        .shift = a[SHIFT].items,
+        .rate = a[RATE].items,
+    };
+    mbma_profile_series(a[RULES].items, panels, a[KINDS].items, a[LOW].items, a[HIGH].items,
+                        a[FIELDS].items, (int)rows, a[SERIES].items, a[ERROR].items, &nodes,
+                        a[STOPS].items);
+    *answer = 0;
+    return true;
+}
+
+static bool do_profile_totals(const argument *a, long long *answer) {
+    enum { COMPRESSION, EDGES, SERIES, ROWS, WITH_SLOPES, TOTALS };
+    const bool with_slopes = a[WITH_SLOPES].whole != 0;
+    if (a[EDGES].count < 2 || a[ROWS].whole < 1 || a[ROWS].whole > MBMA_PANEL_ROWS)
+        return false;
+    const size_t panels = a[EDGES].count - 1;
+    const size_t rows = (size_t)a[ROWS].whole;
+    const size_t rows_of_totals = with_slopes ? 2 * rows : rows;
+    if (a[SERIES].count != panels * rows * SERIES_TERMS)
+        return false;
+    if (a[TOTALS].count != a[COMPRESSION].count * rows_of_totals)
+        return false;
+    mbma_profile_totals(a[COMPRESSION].count, a[COMPRESSION].items, panels, a[EDGES].items,
+                        a[SERIES].items, (int)rows, with_slopes, a[TOTALS].items);
+    *answer = 0;
+    return true;
+}
+
+/* ---- newton.c ---- */
+
+/* A basis is four arguments: nodes, roots of the weights, modes and the half-space's matrix. */
+enum { BASIS_NODES, BASIS_ROOT_WEIGHTS, BASIS_MODES, BASIS_MATRIX, BASIS_ARGUMENTS };
+
+static mbma_basis basis_of(const argument *basis) {
+    return (mbma_basis){
+        .nodes = basis[BASIS_NODES].count,
+        .v = basis[BASIS_NODES].items,
+        .root_weights = basis[BASIS_ROOT_WEIGHTS].items,
+        .modes = basis[BASIS_MODES].items,
+        .matrix = basis[BASIS_MATRIX].items,
+    };
+}
+
+/* The work space of more nodes than these would be of terabytes. */
+#define MOST_BASIS_NODES (1 << 20)
+
+static bool do_height_integrals(const argument *a, long long *answer) {
+    enum { TWICE_N, X, INTEGRALS };
+    *answer = (long long)mbma_height_integrals(a[TWICE_N].whole, a[X].count, a[X].items,
+                                               a[INTEGRALS].items);
+    return true;
+}
+
+static bool do_islands_work(const argument *a, long long *answer) {
+    const int64_t nodes = a[0].whole;
+    if (nodes < 0 || nodes >= MOST_BASIS_NODES)
+        return false;
+    *answer = MBMA_ISLANDS_WORK(nodes);
+    return true;
+}
+
+static bool do_solve_islands(const argument *a, long long *answer) {
+    enum { X, MU, RTOL, FINE, COARSE = FINE + BASIS_ARGUMENTS };
+    enum { PHI = COARSE + BASIS_ARGUMENTS, STEPS, STATUS, RHO, PRESSURE, GAP, WORK };
+    const mbma_basis fine = basis_of(&a[FINE]);
+    const mbma_basis coarse = basis_of(&a[COARSE]);
+    /* profiles are written all three or not at all */
+    if (a[PRESSURE].count != a[RHO].count || a[GAP].count != a[RHO].count)
+        return false;
+    if (a[WORK].count < MBMA_ISLANDS_WORK(fine.nodes))
+        return false;
+    *answer = (long long)mbma_solve_islands(a[X].count, a[X].items, a[MU].items, a[RTOL].real,
+                                            &fine, &coarse, a[PHI].items, a[STEPS].items,
+                                            a[STATUS].items, a[RHO].items, a[PRESSURE].items,
+                                            a[GAP].items, a[WORK].items);
+    return true;
+}
+
+static bool do_island_extents(const argument *a, long long *answer) {
+    enum { X, MU, SHARE, SQUARED };
+    *answer = (long long)mbma_island_extents(a[X].count, a[X].items, a[MU].items, a[SHARE].real,
+                                             a[SQUARED].items);
+    return true;
+}
+
+/* ---- law.c ---- */
+
+/* Whether a block is that of a law, in which numbers of records are between the first and the last
+ * one. */
+static bool is_law(const argument *block) {
+    const mbma_law law = mbma_law_open(block->items, block->count);
     if (law.head == NULL)
         return false;
-    const size_t rows = ((size_t)law.head->first_word - WORDS(mbma_law_head)) / WORDS(mbma_law_row);
+    const size_t words_of_rows = (size_t)law.head->first_word - WORDS(mbma_law_head);
+    const size_t rows = words_of_rows / WORDS(mbma_law_row);
     bool modest = true;
     for (size_t k = 0; k < rows; k++)
         modest = modest && is_modest(law.rows[k].base);
     return modest;
 }
+
 /* Whether a whole number is that of a quantity that has an inverse. */
 static bool has_inverse(int64_t which) { return which == MBMA_FORCE || which == MBMA_AREA; }
-/* Records of an inverse, of whose words the first ones are its head. */
-#define GUESSES(k) ((N(k) - WORDS(mbma_inverse)) / WORDS(mbma_inverse_record) + 1)
-static bool is_inverse(const argument *a) {
-    return a->n >= WORDS(mbma_inverse) && (a->n - WORDS(mbma_inverse)) % WORDS(mbma_inverse_record) == 0 &&
-           is_modest(((const mbma_inverse *)a->data)->first_bucket);
+
+static bool is_inverse(const argument *inverse) {
+    if (inverse->count < WORDS(mbma_inverse))
+        return false;
+    const size_t words_of_more_records = inverse->count - WORDS(mbma_inverse);
+    return words_of_more_records % WORDS(mbma_inverse_record) == 0 &&
+           is_modest(((const mbma_inverse *)inverse->items)->first_bucket);
 }
 
-/* First in all calls: coefficients; first nodes, rates, ends of the range, three constants; cells; of surfaces
+/* Records of an inverse, whose structure holds the first one. */
+static size_t records_of(const argument *inverse) {
+    return (inverse->count - WORDS(mbma_inverse)) / WORDS(mbma_inverse_record) + 1;
+}
+
+static bool do_law_fill(const argument *a, long long *answer) {
+    enum { SEPARATION, LAW, FORCE, AREA, STIFFNESS, AREA_SLOPE, ENERGY };
+    if (!is_law(&a[LAW]))
+        return false;
+    const mbma_law law = mbma_law_open(a[LAW].items, a[LAW].count);
+    *answer = (long long)mbma_law_fill(a[SEPARATION].count, a[SEPARATION].items, &law,
+                                       a[FORCE].items, a[AREA].items, a[STIFFNESS].items,
+                                       a[AREA_SLOPE].items, a[ENERGY].items);
+    return true;
+}
+
+static bool do_inverse_nodes(const argument *a, long long *answer) {
+    enum { WANTED, LAW, QUANTITY, END, X, SIDE };
+    if (!is_law(&a[LAW]) || !has_inverse(a[QUANTITY].whole))
+        return false;
+    const mbma_law law = mbma_law_open(a[LAW].items, a[LAW].count);
+    *answer = (long long)mbma_inverse_nodes(a[WANTED].count, a[WANTED].items, &law,
+                                            (mbma_quantity)a[QUANTITY].whole, a[END].real,
+                                            a[X].items, a[SIDE].items);
+    return true;
+}
+
+static bool do_law_invert(const argument *a, long long *answer) {
+    enum { WANTED, LAW, INVERSE, QUANTITY, SEPARATION, AREA, STIFFNESS };
+    if (!is_law(&a[LAW]) || !is_inverse(&a[INVERSE]) || !has_inverse(a[QUANTITY].whole))
+        return false;
+    const mbma_law law = mbma_law_open(a[LAW].items, a[LAW].count);
+    *answer = (long long)mbma_law_invert(a[WANTED].count, a[WANTED].items, &law, a[INVERSE].items,
+                                         records_of(&a[INVERSE]), (mbma_quantity)a[QUANTITY].whole,
+                                         a[SEPARATION].items, a[AREA].items, a[STIFFNESS].items);
+    return true;
+}
+
+/* ---- calibrated.c ---- */
+
+/* First in all calls: a spline, which is coefficients, numbers and cells of each axis; of surfaces
  * Hurst exponents and ln zeta_1. Then their h_max, ends and pieces, or None. */
+enum {
+    COEFFICIENTS,
+    SPLINE_NUMBERS,
+    SPLINE_CELLS,
+    SURFACES_HURST,
+    SURFACES_LOG_ZETA_1,
+    SURFACES_H_MAX,
+    SURFACES_ENDS,
+    SURFACES_PIECES,
+    SURFACES_ARGUMENTS
+};
 #define SPLINE "F D13 L3 Dn Dn "
+
+/* The second of them; ends of the range by axis. */
+typedef struct {
+    double first[3], rate[3], hurst_low, hurst_high, log_zeta_1_low, log_zeta_1_high;
+    double area_s0, area_slope, area_t0;
+} spline_numbers;
+
+/* Cells of an axis, of which the product of three does not overflow. */
+enum { MOST_CELLS = 100000 };
+
+/* Coefficients of the powers 0 to 5 for each cell of the third axis and each surface. */
+static size_t words_of_pieces(const argument *a) {
+    const int64_t *const cells = a[SPLINE_CELLS].items;
+    return a[SURFACES_HURST].count * 6 * (size_t)cells[2];
+}
+
 static bool fits_spline(const argument *a) {
-    const int64_t *const c = P(2);
-    for (int k = 0; k < 3; k++)
-        if (c[k] < 1 || c[k] > 100000)
+    const int64_t *const cells = a[SPLINE_CELLS].items;
+    /* along each axis 5 more than cells, and two more in all */
+    size_t coefficients = 1;
+    for (int axis = 0; axis < 3; axis++) {
+        if (cells[axis] < 1 || cells[axis] > MOST_CELLS)
             return false;
-    const size_t coefficients = (size_t)(c[0] + 5) * (size_t)(c[1] + 5) * (size_t)(c[2] + 5) + 2;
-    return P(7) ? N(7) == N(3) * 6 * (size_t)c[2] : N(0) >= coefficients;
-}
-static mbma_spline spline_of(const argument *a) {
-    const int64_t *const c = P(2);
-    const double *const x = P(1);
-    return (mbma_spline){P(0), {(size_t)c[0], (size_t)c[1], (size_t)c[2]}, {x[0], x[1], x[2]}, {x[3], x[4], x[5]},
-                         {x[6], x[8]}, {x[7], x[9]}};
-}
-#define CONSTANT(k) ((const double *)P(1))[10 + (k)]
-#define LOG_FORCE ((const mbma_spline[]){spline_of(a)})
-#define CALIBRATED ((const mbma_calibrated_table[]){{spline_of(a), CONSTANT(0), CONSTANT(1), CONSTANT(2)}})
-#define SURFACES ((const mbma_surfaces[]){{N(3), P(3), P(4), P(5), P(6), P(7)}})
-
-/* Of a law: gradient and alpha, seven constants and h_max. */
-#define WAVES ((const mbma_waves[]){{N(0), P(0), P(1), P(2), NUMBER(0), NUMBER(1)}})
-#define NUMBER(k) ((const double *)P(3))[k]
-#define CONSTANTS \
-    ((const mbma_law_constants[]){{NUMBER(2), NUMBER(3), NUMBER(4), NUMBER(5), NUMBER(6), NUMBER(7), NUMBER(8)}})
-
-/* Every function: its name, the kinds of its arguments, what else their sizes must be, and the call. */
-#define FUNCTIONS(FN) \
-    /* elementary.h */ \
-    FN(elementary, "i Dn wn", true, elementary(I(0), N(1), P(1), P(2))) \
-    /* totals.c */ \
-    FN(phi, "Dn Dn D J D6 w3n b?n", is_table(&a[2]), mbma_phi(N(0), P(0), P(1), CELLS(2), P(5), P(6))) \
-    FN(totals, "Dn Dn Dn Dn d D8 D J D6 w4n wn bn l1", is_table(&a[6]), \
-       mbma_totals(N(0), P(0), P(1), P(2), P(3), X(4), VARIANT(5), CELLS(6), P(9), P(10), P(11), P(12))) \
-    FN(island_geometry, "d d d D8 w", N(4) == WORDS(mbma_island), \
-       mbma_island_geometry(X(0), X(1), X(2), VARIANT(3), P(4))) \
-    /* profile.c */ \
-    FN(profile_islands, "Dn d d d D8 D J D6 w4n w1", is_table(&a[5]), \
-       mbma_profile_islands(N(0), P(0), X(1), X(2), X(3), VARIANT(4), CELLS(5), P(8), P(9))) \
-    FN(profile_missed, "D Ln Dn Dn D i d wn", are_panels(a), \
-       (mbma_profile_missed(P(0), N(1), P(1), P(2), P(3), P(4), (int)I(5), X(6), P(7)), 0)) \
-    FN(profile_series, "D Ln Dn Dn D i w wn w wm wm l", \
-       are_panels(a) && N(6) == N(1) * (size_t)I(5) * SERIES_TERMS && N(9) == N(1) * MBMA_PANEL_NODES && \
-       N(8) == (size_t)I(5) * N(9) && N(11) == N(1) + 1, \
-       (mbma_profile_series(P(0), N(1), P(1), P(2), P(3), P(4), (int)I(5), P(6), P(7), NODES(8), P(11)), 0)) \
-    FN(profile_totals, "D D D i i w", \
-       N(1) > 1 && I(3) > 0 && I(3) <= MBMA_PANEL_ROWS && N(2) == (N(1) - 1) * (size_t)I(3) * SERIES_TERMS && \
-       N(5) == N(0) * (size_t)I(3) * (I(4) ? 2 : 1), \
-       (mbma_profile_totals(N(0), P(0), N(1) - 1, P(1), P(2), (int)I(3), I(4) != 0, P(5)), 0)) \
-    /* newton.c */ \
-    FN(height_integrals, "i Dn wn", true, mbma_height_integrals(I(0), N(1), P(1), P(2))) \
-    FN(islands_work, "i", I(0) >= 0 && I(0) < 1 << 20, MBMA_ISLANDS_WORK(I(0))) \
-    FN(solve_islands, "Dn Dn d Dk Dk Dkk Dkk Dm Dm Dmm Dmm w3n ln bn w?nk w?nk w?nk w", \
-       N(15) == N(14) && N(16) == N(14) && N(17) >= MBMA_ISLANDS_WORK(N(3)), \
-       mbma_solve_islands(N(0), P(0), P(1), X(2), BASIS(3), BASIS(7), P(11), P(12), P(13), P(14), P(15), P(16), \
-                          P(17))) \
-    FN(island_extents, "Dn Dn d wn", true, mbma_island_extents(N(0), P(0), P(1), X(2), P(3))) \
-    /* law.c */ \
-    FN(law_fill, "Dn D w?n w?n w?n w?n w?n", is_law(&a[1]), \
-       mbma_law_fill(N(0), P(0), LAW(1), P(2), P(3), P(4), P(5), P(6))) \
-    FN(inverse_nodes, "Dn D i d wn wn", is_law(&a[1]) && has_inverse(I(2)), \
-       mbma_inverse_nodes(N(0), P(0), LAW(1), (mbma_quantity)I(2), X(3), P(4), P(5))) \
-    FN(law_invert, "Dn D D i wn w?n w?n", is_law(&a[1]) && is_inverse(&a[2]) && has_inverse(I(3)), \
-       mbma_law_invert(N(0), P(0), LAW(1), P(2), GUESSES(2), (mbma_quantity)I(3), P(4), P(5), P(6))) \
-    /* calibrated.c */ \
-    FN(spline_pieces, SPLINE "D D D w", fits_spline(a) && !P(7) && N(8) == N(3) * 6 * (size_t)((int64_t *)P(2))[2], \
-       mbma_spline_pieces(LOG_FORCE, SURFACES, P(8))) \
-    FN(calibrated_ends, SPLINE "Dn D D w2n", fits_spline(a), mbma_calibrated_ends(CALIBRATED, SURFACES, P(8))) \
-    FN(calibrated_contact, SPLINE "Dn D2n D Lm Dm wm wm wm", fits_spline(a) && N(3) > 0, \
-       mbma_calibrated_contact(CALIBRATED, SURFACES, N(8), P(8), P(9), P(10), P(11), P(12))) \
-    FN(calibrated_separation, SPLINE "Dn D2n D Lm Dm wm", fits_spline(a) && N(3) > 0, \
-       mbma_calibrated_separation(CALIBRATED, SURFACES, N(8), P(8), P(9), P(10))) \
-    FN(spline_values, SPLINE "D D D Lm Dm wm wm", fits_spline(a) && N(3) > 0, \
-       mbma_spline_values(LOG_FORCE, SURFACES, N(8), P(8), P(9), P(10), P(11))) \
-    FN(self_affine, "Dn Dn wn wn", true, mbma_self_affine(N(0), P(0), P(1), P(2), P(3))) \
-    /* spectrum_laws.c */ \
-    FN(words_of_spectrum_law, "", true, WORDS(mbma_spectrum_law)) \
-    FN(spectrum_waves, "Dn Dn wm wm wm w4", true, mbma_spectrum_waves(N(0), P(0), P(1), N(2), P(2), P(3), P(4), P(5))) \
-    FN(spectrum_law_of, "Dn Dn Dn D10 w3n w", N(5) == WORDS(mbma_spectrum_law), \
-       mbma_spectrum_law_of(WAVES, CONSTANTS, NUMBER(9), P(4), P(5))) \
-    FN(spectrum_law_contact, "D Dn wn wn wn", N(0) == WORDS(mbma_spectrum_law), \
-       mbma_spectrum_law_contact(P(0), N(1), P(1), P(2), P(3), P(4))) \
-    FN(spectrum_law_separation, "D Dn i wn wn", N(0) == WORDS(mbma_spectrum_law), \
-       mbma_spectrum_law_separation(P(0), N(1), P(1), I(2) != 0, P(3), P(4)))
-
-/* A function of arguments: whether their sizes fit, and the result. */
-#define DEFINE_CALL(name, kinds, fits, call) \
-    static bool do_##name(const argument *a, long long *found) { \
-        (void)a; \
-        return (fits) && (*found = (long long)(call), true); \
+        coefficients *= (size_t)(cells[axis] + 5);
     }
-FUNCTIONS(DEFINE_CALL)
+    coefficients += 2;
+    /* with pieces, coefficients are not read */
+    if (a[SURFACES_PIECES].items != NULL)
+        return a[SURFACES_PIECES].count == words_of_pieces(a);
+    return a[COEFFICIENTS].count >= coefficients;
+}
+
+static mbma_spline spline_of(const argument *a) {
+    const int64_t *const cells = a[SPLINE_CELLS].items;
+    const spline_numbers *const numbers = a[SPLINE_NUMBERS].items;
+    mbma_spline spline = {
+        .coefficients = a[COEFFICIENTS].items,
+        .low = {numbers->hurst_low, numbers->log_zeta_1_low},
+        .high = {numbers->hurst_high, numbers->log_zeta_1_high},
+    };
+    for (int axis = 0; axis < 3; axis++) {
+        spline.cells[axis] = (size_t)cells[axis];
+        spline.first[axis] = numbers->first[axis];
+        spline.rate[axis] = numbers->rate[axis];
+    }
+    return spline;
+}
+
+static mbma_calibrated_table calibrated_of(const argument *a) {
+    const spline_numbers *const numbers = a[SPLINE_NUMBERS].items;
+    return (mbma_calibrated_table){
+        .log_force = spline_of(a),
+        .area_s0 = numbers->area_s0,
+        .area_slope = numbers->area_slope,
+        .area_t0 = numbers->area_t0,
+    };
+}
+
+static mbma_surfaces surfaces_of(const argument *a) {
+    return (mbma_surfaces){
+        .count = a[SURFACES_HURST].count,
+        .hurst = a[SURFACES_HURST].items,
+        .log_zeta_1 = a[SURFACES_LOG_ZETA_1].items,
+        .h_max = a[SURFACES_H_MAX].items,
+        .ends = a[SURFACES_ENDS].items,
+        .pieces = a[SURFACES_PIECES].items,
+    };
+}
+
+static bool do_spline_pieces(const argument *a, long long *answer) {
+    enum { PIECES = SURFACES_ARGUMENTS };
+    if (!fits_spline(a) || a[SURFACES_PIECES].items != NULL)
+        return false;
+    if (a[PIECES].count != words_of_pieces(a))
+        return false;
+    const mbma_spline spline = spline_of(a);
+    const mbma_surfaces surfaces = surfaces_of(a);
+    *answer = (long long)mbma_spline_pieces(&spline, &surfaces, a[PIECES].items);
+    return true;
+}
+
+static bool do_calibrated_ends(const argument *a, long long *answer) {
+    enum { ENDS = SURFACES_ARGUMENTS };
+    if (!fits_spline(a))
+        return false;
+    const mbma_calibrated_table table = calibrated_of(a);
+    const mbma_surfaces surfaces = surfaces_of(a);
+    *answer = (long long)mbma_calibrated_ends(&table, &surfaces, a[ENDS].items);
+    return true;
+}
+
+static bool do_calibrated_contact(const argument *a, long long *answer) {
+    enum { OWNER = SURFACES_ARGUMENTS, SEPARATION, FORCE, AREA, STIFFNESS };
+    if (!fits_spline(a) || a[SURFACES_HURST].count == 0)
+        return false;
+    const mbma_calibrated_table table = calibrated_of(a);
+    const mbma_surfaces surfaces = surfaces_of(a);
+    *answer = (long long)mbma_calibrated_contact(&table, &surfaces, a[OWNER].count, a[OWNER].items,
+                                                 a[SEPARATION].items, a[FORCE].items,
+                                                 a[AREA].items, a[STIFFNESS].items);
+    return true;
+}
+
+static bool do_calibrated_separation(const argument *a, long long *answer) {
+    enum { OWNER = SURFACES_ARGUMENTS, FORCE, SEPARATION };
+    if (!fits_spline(a) || a[SURFACES_HURST].count == 0)
+        return false;
+    const mbma_calibrated_table table = calibrated_of(a);
+    const mbma_surfaces surfaces = surfaces_of(a);
+    *answer = (long long)mbma_calibrated_separation(&table, &surfaces, a[OWNER].count,
+                                                    a[OWNER].items, a[FORCE].items,
+                                                    a[SEPARATION].items);
+    return true;
+}
+
+static bool do_spline_values(const argument *a, long long *answer) {
+    enum { OWNER = SURFACES_ARGUMENTS, X, VALUE, SLOPE };
+    if (!fits_spline(a) || a[SURFACES_HURST].count == 0)
+        return false;
+    const mbma_spline spline = spline_of(a);
+    const mbma_surfaces surfaces = surfaces_of(a);
+    *answer = (long long)mbma_spline_values(&spline, &surfaces, a[OWNER].count, a[OWNER].items,
+                                            a[X].items, a[VALUE].items, a[SLOPE].items);
+    return true;
+}
+
+static bool do_self_affine(const argument *a, long long *answer) {
+    enum { HURST, LOG_ZETA_1, ALPHA, GRADIENT };
+    *answer = (long long)mbma_self_affine(a[HURST].count, a[HURST].items, a[LOG_ZETA_1].items,
+                                          a[ALPHA].items, a[GRADIENT].items);
+    return true;
+}
+
+/* ---- spectrum_laws.c ---- */
+
+/* What a law of a spectrum needs beside its waves. */
+typedef struct {
+    double gradient, alpha;
+    mbma_law_constants constants;
+    double h_max;
+} spectrum_numbers;
+
+static bool do_words_of_spectrum_law(const argument *a, long long *answer) {
+    (void)a;
+    *answer = WORDS(mbma_spectrum_law);
+    return true;
+}
+
+static bool do_spectrum_waves(const argument *a, long long *answer) {
+    enum { Q, C, X, VARIANCE, BELOW, FACTS };
+    *answer = (long long)mbma_spectrum_waves(a[Q].count, a[Q].items, a[C].items, a[X].count,
+                                             a[X].items, a[VARIANCE].items, a[BELOW].items,
+                                             a[FACTS].items);
+    return true;
+}
+
+static bool do_spectrum_law_of(const argument *a, long long *answer) {
+    enum { X, VARIANCE, BELOW, NUMBERS, WORK, LAW };
+    if (a[LAW].count != WORDS(mbma_spectrum_law))
+        return false;
+    const spectrum_numbers *const numbers = a[NUMBERS].items;
+    const mbma_waves waves = {
+        .count = a[X].count,
+        .x = a[X].items,
+        .variance = a[VARIANCE].items,
+        .below = a[BELOW].items,
+        .gradient = numbers->gradient,
+        .alpha = numbers->alpha,
+    };
+    *answer = mbma_spectrum_law_of(&waves, &numbers->constants, numbers->h_max, a[WORK].items,
+                                   a[LAW].items);
+    return true;
+}
+
+static bool do_spectrum_law_contact(const argument *a, long long *answer) {
+    enum { LAW, SEPARATION, FORCE, AREA, STIFFNESS };
+    if (a[LAW].count != WORDS(mbma_spectrum_law))
+        return false;
+    *answer = (long long)mbma_spectrum_law_contact(a[LAW].items, a[SEPARATION].count,
+                                                   a[SEPARATION].items, a[FORCE].items,
+                                                   a[AREA].items, a[STIFFNESS].items);
+    return true;
+}
+
+static bool do_spectrum_law_separation(const argument *a, long long *answer) {
+    enum { LAW, FORCE, WHOLE, SEPARATION, SLOPE };
+    if (a[LAW].count != WORDS(mbma_spectrum_law))
+        return false;
+    *answer = (long long)mbma_spectrum_law_separation(a[LAW].items, a[FORCE].count, a[FORCE].items,
+                                                      a[WHOLE].whole != 0, a[SEPARATION].items,
+                                                      a[SLOPE].items);
+    return true;
+}
+
+/* ---- all functions ---- */
+
+/* Names of the functions `do_...`, which return whether the sizes and numbers of their arguments
+ * fit, and the kinds of these arguments, one word each. A word begins with a letter:
+ *
+ *     d  a double               i  a whole number
+ *     D  doubles to be read     w  doubles to be written
+ *     L  int64 to be read       l  int64 to be written
+ *     J  int32 to be read       b  bytes to be written
+ *     F  floats to be read
+ *
+ * After that of an array may follow `?` if it may be None, and its size: a product of a number and
+ * of the letters k, m and n, each of which is the size of the first array that has it. */
+#define FUNCTIONS(FN) \
+    FN(elementary, "i Dn wn") \
+    FN(phi, "Dn Dn " TABLE "w3n b?n") \
+    FN(totals, "Dn Dn Dn Dn d D8 " TABLE "w4n wn bn l1") \
+    FN(island_geometry, "d d d D8 w") \
+    FN(profile_islands, "Dn d d d D8 " TABLE "w4n w1") \
+    FN(profile_missed, PANELS "d wn") \
+    FN(profile_series, PANELS "w wn w wm wm l") \
+    FN(profile_totals, "D D D i i w") \
+    FN(height_integrals, "i Dn wn") \
+    FN(islands_work, "i") \
+    FN(solve_islands, "Dn Dn d Dk Dk Dkk Dkk Dm Dm Dmm Dmm w3n ln bn w?nk w?nk w?nk w") \
+    FN(island_extents, "Dn Dn d wn") \
+    FN(law_fill, "Dn D w?n w?n w?n w?n w?n") \
+    FN(inverse_nodes, "Dn D i d wn wn") \
+    FN(law_invert, "Dn D D i wn w?n w?n") \
+    FN(spline_pieces, SPLINE "D D D w") \
+    FN(calibrated_ends, SPLINE "Dn D D w2n") \
+    FN(calibrated_contact, SPLINE "Dn D2n D Lm Dm wm wm wm") \
+    FN(calibrated_separation, SPLINE "Dn D2n D Lm Dm wm") \
+    FN(spline_values, SPLINE "D D D Lm Dm wm wm") \
+    FN(self_affine, "Dn Dn wn wn") \
+    FN(words_of_spectrum_law, "") \
+    FN(spectrum_waves, "Dn Dn wm wm wm w4") \
+    FN(spectrum_law_of, "Dn Dn Dn D10 w3n w") \
+    FN(spectrum_law_contact, "D Dn wn wn wn") \
+    FN(spectrum_law_separation, "D Dn i wn wn")
 
 #endif
