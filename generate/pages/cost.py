@@ -17,6 +17,7 @@ import xarray as xr
 from generate.calibrated_file import rms
 from generate.distances import DEEP, HUES, LOW, THEORIES
 from generate.files import ROOT, dataset, read_csv
+from generate.machined.evaluation import TITLES
 from generate.page import Measured, panels, printed
 from mbma_tables.scenes.plan import shipped_costs
 
@@ -30,11 +31,12 @@ GAUGES = {
     "area_light": "contact area at a given pressure",
     "force_light": "pressure at a given gap",
 }
-OWN = ("corrected", "simulated")  # theories of a map, timed in docs/lookup.md
+# simulations of a map, timed in docs/lookup.md, by what their columns of the data set begin with
+OWN = ("corrected", "simulated")
 COLOURS = {
     **dict(zip(THEORIES, HUES, strict=True)),
     "boundary elements": "C5",
-    **dict.fromkeys(OWN, "C8"),
+    **{TITLES[form]: "C8" for form in OWN},
 }
 MARKS = "osD^vP*Xh<>d"
 
@@ -115,15 +117,15 @@ def gauge_rows(distances: pd.DataFrame) -> pd.DataFrame:
     rows = cold.assign(us=1e6 * cold["cost"] * shipped_costs().seconds)
     machined = dataset("machined")
     benchmarks = (ROOT / "docs" / "lookup.md").read_text(encoding="utf-8")
-    for theory in OWN:
+    for form in OWN:
         timed = re.search(
-            rf"256 x 256, periodic: {theory}.* \| ([\d.]+) s \|", benchmarks
+            rf"256 x 256, periodic: {TITLES[form]}.* \| ([\d.]+) s \|", benchmarks
         )
         assert timed is not None
         microseconds = 1e6 * float(timed[1])
-        deviations = _deviations(machined, theory)
+        deviations = _deviations(machined, form)
         rows.loc[len(rows), ["theory", "us", *GAUGES]] = [
-            theory,
+            TITLES[form],
             microseconds,
             *deviations,
         ]
@@ -131,13 +133,13 @@ def gauge_rows(distances: pd.DataFrame) -> pd.DataFrame:
     return rows.assign(**percentages)
 
 
-def _deviations(machined: xr.Dataset, theory: str) -> tuple[float, float]:
+def _deviations(machined: xr.Dataset, form: str) -> tuple[float, float]:
     """Root mean squares of ln(theory/simulation) of area and of force, on machined maps."""
     area = machined.area
-    is_light = (area >= LOW) & (area <= DEEP) & (machined[f"{theory}_valid"] > 0)
-    log_area = np.log(machined[f"{theory}_area"] / area)
+    is_light = (area >= LOW) & (area <= DEEP) & (machined[f"{form}_valid"] > 0)
+    log_area = np.log(machined[f"{form}_area"] / area)
     # the error of the gap as one of the force at the gap
-    gap = machined[f"{theory}_mean_separation"] - machined.mean_separation
+    gap = machined[f"{form}_mean_separation"] - machined.mean_separation
     log_force = gap * machined.stiffness / machined.pressure
     seen = is_light.values
     return rms(log_area.values[seen]), rms(log_force.values[seen])

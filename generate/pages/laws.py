@@ -30,12 +30,12 @@ from generate.leakage_law import (
     summary,
 )
 from generate.page import Cell, Measured, panels, spans, table
-from mbma_tables import Surface, contact, materials
+from mbma_tables import Bodies, Surface, contact, materials
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.contacts.leakage import GROUP, shipped_flow
 from mbma_tables.quantities.effective_medium import FlowConstants
+from mbma_tables.quantities.leakage import GROUP, shipped_flow
 from mbma_tables.theories.calibrated.formulas import CONSTANTS
 from mbma_tables.theories.calibrated.table import shipped
 from mbma_tables.theories.evidence import shipped_part
@@ -473,11 +473,15 @@ def _frozen_errors(one: Capped, theory: str) -> FloatArray:
     in_range = one.area > YIELD_BINS[0]
     try:
         pressure = one.force[in_range] * g
-        by = contact(one.surface, pressure=pressure, theory=theory, hardness=hardness)
+        by = contact(
+            one.surface, Bodies(hardness=hardness), pressure=pressure, theory=theory
+        )
     except OutOfRangeError as fault:  # MBMA ends before
         in_range[in_range] = ~np.asarray(fault.mask)
         pressure = one.force[in_range] * g
-        by = contact(one.surface, pressure=pressure, theory=theory, hardness=hardness)
+        by = contact(
+            one.surface, Bodies(hardness=hardness), pressure=pressure, theory=theory
+        )
     error = np.log(by.unloading_stiffness / (one.frozen[in_range] * g))
     return np.stack([one.area[in_range], error, by.unloading_stiffness_scatter])
 
@@ -518,7 +522,9 @@ def _range(ends: Iterable[float], form: str) -> str:
 def draw_yield(ratios: FloatArray) -> Figure:
     """Area and force of elastic answers over the simulated ones against psi."""
     hardness = float(SURFACE.rms_gradient) / INDICES
-    capped_contact = contact(SURFACE, area=0.03, theory="calibrated", hardness=hardness)
+    capped_contact = contact(
+        SURFACE, Bodies(hardness=hardness), area=0.03, theory="calibrated"
+    )
     at_equal_force = contact(
         SURFACE, pressure=capped_contact.pressure, theory="calibrated"
     )

@@ -20,7 +20,7 @@ from generate.machined import makers
 from generate.machined.campaign import FORMS
 from generate.machined.evaluation import by_family, covered, families_left_out, yielding
 from generate.page import Cell, Measured, Picture, panels, printed, table
-from mbma_tables import Surface, contact
+from mbma_tables import Surface, contact, theories
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.common.files import write_file
@@ -320,7 +320,9 @@ def draw_families() -> Figure:
 def machined() -> Measured:
     data = dataset("machined")
     parts = {"yielding": yielding(data), "coverage": covered(data)}
-    for form in FORMS:
-        parts[form] = by_family(data, form)
-        parts[f"left_out_{form}"] = families_left_out(data, form)
+    for form, theory in FORMS.items():
+        is_simulation = isinstance(theory, theories.Simulated)
+        section = str(theory.grid) if is_simulation else theory.name
+        parts[section] = by_family(data, form)
+        parts[f"left_out_{section}"] = families_left_out(data, form)
     return parts, {"docs/figures/machined.svg": draw_families()}

@@ -20,9 +20,10 @@ from generate.files import dataset
 from generate.page import Cell, Measured, panels, percent, table
 from generate.rough_spheres import RADIUS, heights
 from mbma_tables import Joint, Surface, flow_factors, rough_contact
+from mbma_tables.bodies import mean_conductivity
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.data import boundary_elements
-from mbma_tables.quantities.conductance import cooper_mikic_yovanovich, mean_conductivity
+from mbma_tables.quantities.conductances import cooper_mikic_yovanovich
 from mbma_tables.rough_body.rough_contact import mean_wavelength
 from mbma_tables.surfaces.any_surface import AnySurface
 
@@ -60,11 +61,12 @@ def conductances(one: Joint, pressure: FloatArray) -> tuple[FloatArray, FloatArr
 
     By the law and by the correlation.
     """
+    assert one.pair is not None
     conductivities = [float(text.split()[0]) for text in one.pair.conductivities]
     k = mean_conductivity(*conductivities)
     assert one.pair.hardness is not None
     hardness = 1e3 * float(one.pair.hardness.split()[0])
-    law = one.at_pressure([f"{p} MPa" for p in pressure]).conductance()
+    law = one.at_pressure([f"{p} MPa" for p in pressure]).conductance
     # lengths in um, so that W/(m K) over um is 1e6 W/(m^2 K)
     correlation = cooper_mikic_yovanovich(one.surface, pressure, k, 1.0, hardness)
     return np.asarray(law), 1e6 * np.asarray(correlation)
@@ -113,7 +115,7 @@ def _usual_conductances(axes: Axes) -> str:
         joint = Joint(
             face | {"Rq": "1.6 um"},
             face | {"Rq": "0.8 um"},
-            materials=materials,
+            bodies=materials,
             nominal_area="4 cm^2",
         )
         pairs = zip(*conductances(joint, np.array(PRESSURES)), strict=True)
@@ -227,9 +229,7 @@ def _draw_ball() -> Figure:
     """Pressure by distance and force by approach, of one ball on a flat."""
     figure, (left, right) = panels(1, 2, (9, 4))
     forces = [f"{10.0**k} N" for k in (-1, 0, 1, 2)]
-    ball = rough_contact(
-        FACE, "5 mm", force=forces, E_star="110 GPa", theory="calibrated"
-    )
+    ball = rough_contact(FACE, "5 mm", "110 GPa", force=forces, theory="calibrated")
     by_force = zip(ball.position, ball.pressure, np.asarray(ball.force), strict=True)
     for r, p, force in by_force:
         left.semilogy(r, 1e3 * p, label=f"{force:.3g} N")

@@ -23,6 +23,7 @@ from generate.tables.exact_geometry import DOUBLES, divisor, exact_island
 from generate.tables.height_coefficients import height_integral
 from mbma_tables import Surface, contact, greenwood_tripp
 from mbma_tables.common.errors import MbmaError
+from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma.geometry import geometry, kinks
 from mbma_tables.theories.mbma.island_models import answer_islands
 from mbma_tables.theories.mbma.tables import get_model
@@ -209,7 +210,9 @@ def _total_by(
 ) -> Answer:
     surface = Surface(hurst, 1.0, zeta_1, 1.0, TOP)
     total = contact(
-        surface, separation=TOP - depth, island_model=name, variant=variant, rtol=rtol
+        surface,
+        separation=TOP - depth,
+        theory=Mbma(island_model=name, variant=variant, rtol=rtol),
     )
     bound = float(total.error) + TOTAL_TRUTH
     return (float(total.pressure), float(total.area)), bound
