@@ -321,8 +321,9 @@ def machined() -> Measured:
     data = dataset("machined")
     parts = {"yielding": yielding(data), "coverage": covered(data)}
     for form, theory in FORMS.items():
-        is_simulation = isinstance(theory, theories.Simulated)
-        section = str(theory.grid) if is_simulation else theory.name
+        section = theory.name
+        if isinstance(theory, theories.Simulated):
+            section = str(theory.grid)
         parts[section] = by_family(data, form)
         parts[f"left_out_{section}"] = families_left_out(data, form)
     return parts, {"docs/figures/machined.svg": draw_families()}
