@@ -93,7 +93,9 @@ def fmu(
         "MOST": number(exported.c_most),
     }
     source = filled(
-        "fmu.c", {what: number(ratio) for what, ratio in found.slopes.items()}, **parts
+        "templates/fmu.c",
+        {what: number(ratio) for what, ratio in found.slopes.items()},
+        **parts,
     )
     built = _binaries(name, source, binaries)
     listed = (
