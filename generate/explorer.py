@@ -24,7 +24,7 @@ from mbma_tables import Surface
 from mbma_tables.common.files import write_file
 from mbma_tables.export import c_code
 from mbma_tables.export.explorer import MODULE, explorer_page
-from mbma_tables.export.law_code import LAW_MODULE
+from mbma_tables.export.languages.javascript import LAW_MODULE
 from mbma_tables.export.text import core_file
 from mbma_tables.theories.mbma.tables import universal_model
 from mbma_tables.theories.mbma.variants import REPORTED

@@ -102,7 +102,7 @@ def source_texts(model: UniversalModel, variant: Variant) -> dict[str, str]:
         | model_texts(heads)
         | {"mbma_data.c": f"{heads['mbma_data.c']}\n{data_text(model, variant)}"}
     )
-    return texts | {SELFTEST: filled(SELFTEST, HEADER=heads[SELFTEST])}
+    return texts | {SELFTEST: filled(f"templates/{SELFTEST}", HEADER=heads[SELFTEST])}
 
 
 def model_texts(heads: dict[str, str]) -> dict[str, str]:
@@ -126,7 +126,7 @@ def model_texts(heads: dict[str, str]) -> dict[str, str]:
         "PERSSON_ERROR": number(persson.INVERSE_RTOL),
     }
     return {
-        name: filled(name, **parts, HEADER=heads[name])
+        name: filled(f"templates/{name}", **parts, HEADER=heads[name])
         for name in ("mbma_model.h", "mbma_model.c")
     }
 

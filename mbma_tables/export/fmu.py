@@ -16,7 +16,8 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor
 from mbma_tables.export.c_code import BuildError, built_by
 from mbma_tables.export.exported_law import ExportedLaw
-from mbma_tables.export.law_code import MAX_NAME, AskedLaw, asked_law, text_of
+from mbma_tables.export.language import AskedLaw
+from mbma_tables.export.law_code import MAX_NAME, asked_law, text_of
 from mbma_tables.export.reserved_words import windows_words
 from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import checked_name, filled, inert, number
@@ -93,7 +94,9 @@ def fmu(
         "MOST": number(exported.c_most),
     }
     source = filled(
-        "fmu.c", {what: number(ratio) for what, ratio in found.slopes.items()}, **parts
+        "templates/fmu.c",
+        {what: number(ratio) for what, ratio in found.slopes.items()},
+        **parts,
     )
     built = _binaries(name, source, binaries)
     listed = (

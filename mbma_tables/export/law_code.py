@@ -1,70 +1,32 @@
-"""A contact law as source code that needs nothing else: the core's own C, or `law_numbers` in a template a language."""
+"""A contact law as source code that needs nothing else.
 
-import base64
+It is the core's own C (`core_code`), or polynomials in a template a language (`polynomials`).
+"""
+
 import functools
-import re
-import zlib
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
-
-from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.export.exported_law import ExportedLaw, GasInGaps, exported_law
-from mbma_tables.export.law_languages import (
-    FUNCTIONS,
-    LANGUAGES,
-    MORE,
-    Beside,
-    Language,
-    flow_numbers,
-    law_numbers,
-)
+from mbma_tables.export.language import FUNCTIONS, AskedLaw, Beside, Language
+from mbma_tables.export.languages import LANGUAGES
 from mbma_tables.export.targets import CODE, Target
-from mbma_tables.export.text import (
-    about,
-    braces,
-    checked_name,
-    core_file,
-    filled,
-    number,
-    numerals,
-    opening,
-    page_file,
-    template,
-    wrapped,
-)
-from mbma_tables.law import block as at
-from mbma_tables.law.law import ContactLaw
+from mbma_tables.export.text import about, checked_name, filled, number, opening
 from mbma_tables.rough_body.force_law import ForceLaw
 from mbma_tables.surfaces.any_surface import AnySurface
 
-LAW_MODULE = "law.wasm"  # the core's laws for JavaScript
-# without functions that follow the unloading stiffness of contact that yields
-LOADING_ALONE = ("python-law", "jax-law", "matlab-law")
-NAME = "law"  # where none is given
-MAX_NAME = 31  # letters, as Fortran and C99 read them
-DATA = """\
-static const struct {{
-    mbma_law_head head;
-    mbma_law_row rows[{rows}];
-    mbma_law_record records[{records}];
-}} {name}_DATA = {{
-{data}
-}};
-static const mbma_law {name} = {{&{name}_DATA.head, {name}_DATA.rows, {name}_DATA.records, {records} - 1}};
-"""  # of a law in C
-MODELICA_NAMES = r"\b(?<!type )(\w+)(?:\[[^]]*\])? = [-\d{]|function (\w+)"
-# functions that other files see, where they are made
-_MADE = re.compile(
-    r"^(?!static|typedef|MBMA_INLINE)\w[\w *]*\b(mbma_\w+)\([^{;]*\{$", re.M
-)
+# where none is given
+NAME = "law"
+# letters, as Fortran and C99 read them
+MAX_NAME = 31
 
 
 def law_text(
     target: str, surface: AnySurface | ForceLaw, E_star: float | str = 1.0, **asked: Any
 ) -> str:
-    """A contact law as source code: pressure, tangent, area, energy and the overclosure at a pressure.
+    """A contact law as source code.
+
+    It has pressure, tangent, area, energy and the overclosure at a pressure.
 
     Parameters
     ----------
@@ -96,9 +58,12 @@ def law_text(
     Examples
     --------
     >>> from mbma_tables import Surface
-    >>> text = law_text("c-law", Surface.named("concrete"), "13.3 MPa", name="road", theory="calibrated")
-    >>> "double road_with_tangent(double c, double *tangent);" in text, "size_t mbma_law_fill(" in text
-    (True, True)
+    >>> road = Surface.named("concrete")
+    >>> text = law_text("c-law", road, "13.3 MPa", name="road", theory="calibrated")
+    >>> "double road_with_tangent(double c, double *tangent);" in text
+    True
+    >>> "size_t mbma_law_fill(" in text
+    True
     """
     return law_files(target, surface, E_star, **asked)[""]
 
@@ -106,7 +71,10 @@ def law_text(
 def law_files(
     target: str, surface: AnySurface | ForceLaw, E_star: float | str = 1.0, **asked: Any
 ) -> dict[str, str]:
-    """The result of `law_text`, and the files beside it, by the ends of their names: ".h" of C, "_c.c" of Fortran."""
+    """The result of `law_text`, and the files beside it, by the ends of their names.
+
+    These are ".h" of C, "_c.c" of Fortran.
+    """
     if target not in LANGUAGES:
         raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
     language = LANGUAGES[target]
@@ -114,25 +82,15 @@ def law_files(
         raise InputError(
             f"{target} has no place for leakage, nor for the force of a body: leave it out"
         )
-    if language.subroutine == "gapcon.c":  # which is of conductance alone
+    if language.conductance_alone:
+        # so that a missing conductivity is refused
         asked.setdefault("conductivity_unit", "")
     checked_name(asked.get("name", NAME), MAX_NAME, language.reserved(), target)
-    made = asked_law(surface, E_star, **asked)
-    files = {"": text_of(target, made)}
+    law = asked_law(surface, E_star, **asked)
+    files = {"": text_of(target, law)}
     for file in language.beside:
-        files[file.end] = text_of(file.target or target, made, file)
+        files[file.end] = text_of(file.target or target, law, file)
     return files
-
-
-class AskedLaw(NamedTuple):
-    """A law and the contents common to its files."""
-
-    name: str  # prefix of functions, or name of the module or package
-    exported: ExportedLaw
-    slopes: dict[str, float]  # ratios of functions to the slope of a law,
-    sloped: ContactLaw  # of the contact without a hardness
-    more: dict[str, str]  # units of the requested quantities of `MORE`
-    said: tuple[str, ...]
 
 
 def asked_law(
@@ -152,246 +110,159 @@ def asked_law(
     conducts = conductivity is not None or conductivity_unit is not None
     if isinstance(surface, ForceLaw) and (conducts or leakage):
         raise InputError(
-            "a force law has neither conductance nor leakage: leave conductivity and leakage out"
+            "a force law has neither conductance nor leakage: leave conductivity and leakage "
+            "out"
         )
     exported = exported_law(surface, E_star, **options)
-    length, stress, law = exported.length, exported.stress, exported.law
-    slopes, more = {}, {}
-    for quantity, wanted in (
-        ("conductance", conducts),
-        ("tangential_stiffness", kappa is not None),
-    ):
-        if wanted:
-            slopes[quantity], more[quantity] = exported.slope(
-                quantity, conductivity, conductivity_unit, kappa
-            )
-    if leakage:
-        more["leakage"] = f"{length}^3"
-    sloped, factor = law.unloading() if slopes else (law, 1.0)
-    what = f"pressure [{stress}], tangent dp/dc [{stress}/{length}], area A/A0, energy, the integral of pressure "
-    what += f"[{stress} {length}]{''.join(f', {quantity} [{unit}]' for quantity, unit in more.items())}"
-    begin = (
-        "no contact below c = 0"
-        if exported.ends
-        else f"c from {number(exported.c_least)}"
-    )
-    turns = "" if law.turning_point is None else ", where pressure turns down"
+    ratios: dict[str, float] = {}
+    units: dict[str, str] = {}
     if conducts:
-        notes += exported.of_gas(
-            gas, more["conductance"], exported.c_turn, included=False
+        ratios["conductance"], units["conductance"] = exported.slope(
+            "conductance", conductivity, conductivity_unit
         )
+    if kappa is not None:
+        ratios["tangential_stiffness"], units["tangential_stiffness"] = exported.slope(
+            "tangential_stiffness", kappa=kappa
+        )
+    if leakage:
+        units["leakage"] = f"{exported.length}^3"
+    # these functions follow the unloading stiffness
+    sloped, factor = exported.law.unloading() if ratios else (exported.law, 1.0)
+    slopes = {quantity: factor * ratio for quantity, ratio in ratios.items()}
+    if conducts:
+        of_gas = exported.of_gas(
+            gas, units["conductance"], exported.c_turn, included=False
+        )
+        notes = (*notes, *of_gas)
     said = exported.header(
-        f"{what}, against overclosure c [{length}]",
-        f"{begin}, to {number(exported.c_most)}; there is no answer outside",
-        f"overclosure at a pressure: up to c = {number(exported.c_turn)}{turns}",
+        _contents(exported, units),
+        _range(exported),
+        _inverse_range(exported),
         *notes,
         end=exported.c_turn,
         leakage=leakage,
     )
-    slopes = {quantity: factor * ratio for quantity, ratio in slopes.items()}
-    return AskedLaw(name, exported, slopes, sloped, more, said)
+    return AskedLaw(name, exported, slopes, sloped, units, said)
+
+
+def _contents(exported: ExportedLaw, units: dict[str, str]) -> str:
+    """The line of a header on the functions of a law."""
+    length = exported.length
+    stress = exported.stress
+    functions = [
+        f"pressure [{stress}]",
+        f"tangent dp/dc [{stress}/{length}]",
+        "area A/A0",
+        f"energy, the integral of pressure [{stress} {length}]",
+        *(f"{quantity} [{unit}]" for quantity, unit in units.items()),
+    ]
+    return f"{', '.join(functions)}, against overclosure c [{length}]"
+
+
+def _range(exported: ExportedLaw) -> str:
+    """The line of a header on the range of overclosures."""
+    begin = "no contact below c = 0"
+    if not exported.ends:
+        begin = f"c from {number(exported.c_least)}"
+    return f"{begin}, to {number(exported.c_most)}; there is no answer outside"
+
+
+def _inverse_range(exported: ExportedLaw) -> str:
+    """The line of a header on the range of the inverse."""
+    line = f"overclosure at a pressure: up to c = {number(exported.c_turn)}"
+    if exported.law.turning_point is None:
+        return line
+    return f"{line}, where pressure turns down"
 
 
 def text_of(target: str, asked: AskedLaw, file: Beside | None = None) -> str:
     """The text of a target's own file, or of one beside it."""
-    language, name, exported = LANGUAGES[target], asked.name, asked.exported
-    yields, nested = asked.sloped is not exported.law, target == "modelica-law"
-    if yields and language.array is not None and not nested:
+    language = LANGUAGES[target]
+    if asked.yields and not language.unloads:
         raise InputError(
-            f"{target} has no place for an unloading stiffness, which conductance and tangential stiffness of yielded "
-            "contact follow: leave the hardness out, or take c-law, fortran-law, javascript-law, modelica-law or an FMU"
+            f"{target} has no place for an unloading stiffness, which conductance and "
+            "tangential stiffness of yielded contact follow: leave the hardness out, or take "
+            "c-law, fortran-law, javascript-law, modelica-law or an FMU"
         )
-    said = (line.replace("{", "{{").replace("}", "}}") for line in asked.said)
-    lines = [*said, language.usage, _example(exported, language)]
-    interface = name.upper()  # as solvers read the name of a surface interaction
-    first = 0.0 if exported.ends else (exported.law.h_max - exported.law.highest) / 2
-    numbers = {"H_MAX": exported.law.h_max, "FIRST": first, "C_TURN": exported.c_turn}
-    numbers |= {"C_LEAST": exported.c_least, "C_MOST": exported.c_most}
-    each = {what: language.number(ratio) for what, ratio in asked.slopes.items()}
-    parts = {
-        "HEADER": opening(
-            (line.format(name=name, interface=interface) for line in lines), language.mark
-        ),
-        "NAME": name,
+    places = _common_places(language, asked)
+    if file is not None:
+        places |= file.parts
+    places |= language.law_places(asked, places)
+    if language.subroutine:
+        routine = language.subroutine
+        places["SUBROUTINE"] = filled(f"languages/{routine}.c", **places)
+        # chooses the law by the name of the surface interaction
+        places["DISPATCHER"] = filled(
+            "languages/interfaces.c", **places, ROUTINE=routine, LISTS=routine.upper()
+        )
+    template = language.template
+    if file is not None and file.template:
+        template = file.template
+    if language.repeated is None:
+        return filled(template, language.ratios(asked), **places)
+    return filled(template, language.repeated(asked), **places)
+
+
+def _common_places(language: Language, asked: AskedLaw) -> dict[str, str]:
+    """Places of templates that are the same in all languages, but for the form of numbers."""
+    exported = asked.exported
+    law = exported.law
+    # as solvers read the name of a surface interaction
+    interface = asked.name.upper()
+    # the lines of the law may have braces of their own
+    said = [line.replace("{", "{{").replace("}", "}}") for line in asked.said]
+    paragraphs = [*said, language.usage, _example(exported, language)]
+    lines = [line.format(name=asked.name, interface=interface) for line in paragraphs]
+    # where pressure is defined first: at contact, or at the law's largest gap
+    first = 0.0 if exported.ends else (law.h_max - law.highest) / 2
+    return {
+        "HEADER": opening(lines, language.mark),
+        "NAME": asked.name,
         "SUBROUTINE": "",
         "INTERFACE": interface,
         "LENGTH": exported.length,
         "STRESS": exported.stress,
-        "ELASTIC": "yes" if yields else "",
+        "H_MAX": language.number(law.h_max),
+        "FIRST": language.number(first),
+        "C_TURN": language.number(exported.c_turn),
+        "C_LEAST": language.number(exported.c_least),
+        "C_MOST": language.number(exported.c_most),
+        "CONDUCTANCE": language.ratios(asked).get("conductance", ""),
         "LEAKAGE": asked.more.get("leakage", ""),
-        "CONDUCTANCE": each.get("conductance", ""),
-        "SLOPED": "ELASTIC" if yields else "LAW",
-        **{place: language.number(value) for place, value in numbers.items()},
-        **dict(language.parts),
-        **dict(file.parts if file else ()),
-    }
-    template_name = file.template if file and file.template else language.template
-    if target == "fortran-law":  # all functions are alike, but for the one of two answers
-        public = [what for what in FUNCTIONS if what in asked.more or what not in MORE]
-        parts["PUBLIC"], each = ", ".join(public), dict.fromkeys(public, "")
-        del each["with_tangent"]
-    elif language.array is None:
-        parts |= _core(target, asked)
-    else:
-        parts |= _numbers(language, "", law_numbers(exported.law))
-        if parts["LEAKAGE"]:
-            parts |= _numbers(language, "flow_", flow_numbers(exported.leakage))
-        if nested:
-            parts["SLOPED"] = "elastic.elastic_tangent" if yields else "tangent"
-        if yields:
-            own = (
-                parts
-                | _numbers(language, "", law_numbers(asked.sloped))
-                | {"NAME": "elastic", "HEADER": ""}
-            )
-            text = filled(
-                language.template, **own | {"LEAKAGE": "", "ELASTIC": ""}
-            ).strip()
-            # some tools confuse names of a package with those of one in it
-            names = "|".join(
-                constant or function
-                for constant, function in re.findall(MODELICA_NAMES, text)
-            )
-            parts["ELASTIC"] = re.sub(rf"\b({names})\b", r"elastic_\1", text)
-    if language.subroutine:
-        parts["SUBROUTINE"] = filled(language.subroutine, **parts)
-        routine = language.subroutine.removesuffix(".c")
-        parts["DISPATCHER"] = filled(
-            "interfaces.c", **parts, ROUTINE=routine, LISTS=routine.upper()
-        )
-    return filled(template_name, each, **parts)
-
-
-def _numbers(language: Language, prefix: str, numbers: dict[str, Any]) -> dict[str, str]:
-    """Numbers of a law by their placeholders."""
-    write: dict[type, Any] = {
-        int: str,
-        float: language.number,
-        np.ndarray: language.array,
-    }
-    texts = {
-        what: write[float if isinstance(value, float) else type(value)](value)
-        for what, value in numbers.items()
-    }
-    return {
-        f"{prefix}{what}".upper(): text
-        for what, text in (texts | {"records": str(len(numbers["centre"]))}).items()
-    }
-
-
-def _core(target: str, asked: AskedLaw) -> dict[str, str]:
-    """The core, as C or compiled, and the law's own blocks."""
-    law, leaks, name, parts = (
-        asked.exported.law,
-        asked.more.get("leakage", ""),
-        asked.name,
-        dict[str, str](),
-    )
-    blocks = {"LAW": law.block} | (
-        {"ELASTIC": asked.sloped.block} if asked.sloped is not law else {}
-    )
-    if leaks:
-        blocks["FLOW"], parts["FLOW_H_RMS"] = (
-            asked.exported.leakage.block,
-            number(asked.exported.leakage.h_rms),
-        )
-    if target == "javascript-law":
-        held = {"WASM": page_file(LAW_MODULE)}
-        held |= {
-            f"{own}_BLOCK": block.astype("<f8", copy=False).tobytes()
-            for own, block in blocks.items()
-        }
-        return parts | {
-            place: base64.b64encode(content).decode("ascii")
-            for place, content in held.items()
-        }
-    return parts | {
-        "CORE": core_text(name),
-        "CODE": _code_mark(),
-        "DECLARED": filled(
-            "law.h", dict.fromkeys(asked.slopes, ""), HEADER="", NAME=name, LEAKAGE=leaks
-        ).lstrip(),
-        "LAWS": "".join(
-            _data(f"{name}_{own}", block) for own, block in blocks.items()
-        ).rstrip(),
+        "ELASTIC": "yes" if asked.yields else "",
+        "SLOPED": "ELASTIC" if asked.yields else "LAW",
+        **language.parts,
     }
 
 
 def _example(exported: ExportedLaw, language: Language) -> str:
-    """One line with values of the library's law; Modelica solves for c itself."""
+    """One line with values of the library's law."""
     c = float(f"{exported.c_turn / 4:.3g}")
-    p, k = (
-        float(value)
-        for value in exported.law.pressure_and_stiffness(exported.law.h_max - c)
-    )
-    answers = {"pressure": (c, p), "tangent": (c, k)} | (
-        {"overclosure": (p, c)} if language.template != "law.mo" else {}
-    )
-    calls = []
-    for what, (x, y) in answers.items():
-        rounded_x = language.number(float(f"{x:.7g}"))
-        calls.append(
-            f"{language.call.format(name='{name}', what=what, x=rounded_x)} = {about(y, 7)}"
-        )
+    p, tangent = exported.law.pressure_and_stiffness(exported.law.h_max - c)
+    calls = [
+        _call(language, "pressure", c, float(p)),
+        _call(language, "tangent", c, float(tangent)),
+    ]
+    if language.inverts:
+        calls.append(_call(language, "overclosure", float(p), c))
     return f"Example: {', '.join(calls)}"
 
 
-def core_text(prefix: str) -> str:
-    """Laws of the core with their headers; a prefix to the functions lets a program hold several."""
-    texts = [core_file(name) for name in ("mbma.h", "elementary.h", "law.c")]
-    renamed = [
-        f"#define {name} {prefix}_{name}"
-        for text in texts
-        for name in _MADE.findall(text)
-    ]
-    parts = [re.sub(r'^#include ".*"\n', "", text, flags=re.M) for text in texts]
-    return "\n".join(
-        [
-            "/* functions of the core, which this file holds, under names of its own */",
-            *renamed,
-            *parts,
-        ]
-    )
+def _call(language: Language, what: str, x: float, y: float) -> str:
+    """A function at a rounded argument, and its value; {name} is filled in later."""
+    rounded_x = language.number(float(f"{x:.7g}"))
+    call = language.call.format(name="{name}", what=what, x=rounded_x)
+    return f"{call} = {about(y, 7)}"
 
 
-@functools.cache
-def _code_mark() -> str:
-    """A number in C of all code that laws in one file share: laws of different code are refused there."""
-    shared = [
-        core_text(""),
-        *map(template, ("law.c", "interfaces.c", "uinter.c", "gapcon.c")),
-    ]
-    return f"0x{zlib.crc32(''.join(shared).encode()):08x}"
-
-
-def _data(name: str, block: FloatArray) -> str:
-    """A law's block as the head, rows and records of a variable in C, every number as it is."""
-    whole = block.view(np.int64)
-    last = int(whole[at.RECORDS])
-    records = [
-        braces(
-            *numerals(row[: at.FORCE_AT]),
-            *np.split(row[at.FORCE_AT : -1], 2),
-            *numerals(row[-1]),
-        )
-        for row in block[last:].reshape(-1, at.RECORD)
-    ]
-    head = braces(
-        *numerals(block[: at.EXPONENT]), *numerals(whole[at.EXPONENT : at.HEAD])
-    )
-    rows = whole[at.HEAD : last].reshape(-1, 2)
-    data = ",\n".join(wrapped(part) for part in (head, braces(*rows), braces(*records)))
-    return DATA.format(name=name, data=data, rows=len(rows), records=len(records))
-
-
-TARGETS = tuple(
-    Target(
+def _target(name: str, language: Language) -> Target:
+    return Target(
         name,
         functools.partial(law_files, name),
         CODE - {"leakage"} if language.subroutine else CODE,
         rows=False,
-        # the C that the module calls is beside it
-        alone=name != "fortran-law",
+        alone=language.alone,
     )
-    for name, language in LANGUAGES.items()
-)
+
+
+TARGETS = tuple(_target(name, language) for name, language in LANGUAGES.items())

@@ -12,8 +12,7 @@ from mbma_tables.common.arguments import nearest
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor
 from mbma_tables.export.exported_law import GasInGaps
-from mbma_tables.export.law_code import LOADING_ALONE
-from mbma_tables.export.law_languages import LANGUAGES
+from mbma_tables.export.languages import LANGUAGES
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.targets import Target, targets
 from mbma_tables.quantities.gas import VACUUM
@@ -100,7 +99,8 @@ def joint_files(
             ],
         )
         _refuse(target, ["friction_pressure"] if friction_pressure is not None else [])
-        if target == "abaqus-uinter" and joint.friction is not None:
+        language = LANGUAGES.get(target)
+        if language and language.frictionless and joint.friction is not None:
             note = f"the joint's friction, {joint.friction:g}, is left out: the faces slide freely"
             shared["made_by"] = (note, *made_by)
         return program.files(
@@ -214,7 +214,8 @@ def _of_code(
     joint: ExportedJoint, target: str, units: Mapping[str, str], heat: bool
 ) -> dict[str, Any]:
     """Arguments of a law as code: the stiffness before slip, and with `heat` conductance, as far as it has them."""
-    if target in LOADING_ALONE and not _is_infinite(joint.hardness):
+    language = LANGUAGES.get(target)
+    if language and not language.unloads and not _is_infinite(joint.hardness):
         note = (
             "without conductance and tangential stiffness, which follow the unloading stiffness of contact that "
             "yields: c-law, fortran-law, javascript-law, modelica-law, an FMU and rows have them"
@@ -228,11 +229,7 @@ def _of_code(
     else:
         arguments["kappa"] = float(joint.kappa(None))
     if heat:
-        if (
-            target in LANGUAGES
-            and LANGUAGES[target].subroutine
-            and joint.gas.name != VACUUM
-        ):
+        if language and language.subroutine and joint.gas.name != VACUUM:
             raise InputError(
                 f"{target} has the conductance of the solid spots alone, without that of {joint.gas.name} in the gaps: "
                 "take rows, which have both, such as target 'abaqus' or 'calculix', or a joint with gas='vacuum'; "

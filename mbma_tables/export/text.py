@@ -87,8 +87,8 @@ def page_file(name: str) -> bytes:
 
 
 def template(name: str) -> str:
-    """The text of a template, with its places."""
-    return (_ROOT / "templates" / f"{name}.in").read_text(encoding="utf-8")
+    """The text of a template, named from this folder on, with its places."""
+    return (_ROOT / f"{name}.in").read_text(encoding="utf-8")
 
 
 def filled(name: str, each: Mapping[str, str] = {}, /, **parts: str) -> str:

@@ -20,8 +20,9 @@ from law_points import ASKED, CONDUCTIVITY, KAPPA, VALUES, needs, points
 from mbma_tables import Surface, contact
 from mbma_tables.core import core
 from mbma_tables.export import LAWS
-from mbma_tables.export.law_code import asked_law, core_text, law_files, law_text, text_of
-from mbma_tables.export.law_languages import LANGUAGES
+from mbma_tables.export.core_code import core_text
+from mbma_tables.export.languages import LANGUAGES
+from mbma_tables.export.law_code import asked_law, law_files, law_text, text_of
 from mbma_tables.export.text import core_file
 
 SUBROUTINES = [target for target, language in LANGUAGES.items() if language.subroutine]
@@ -637,9 +638,7 @@ def test_two_exported_laws_in_one_job_by_surface_interaction(target, how, tmp_pa
         (tmp_path / f"{name}.c").write_text(
             law_points.text(target, law, name=name, **HEAT)
         )
-    objects = joined(
-        how, LANGUAGES[target].subroutine.removesuffix(".c").upper(), tmp_path
-    )
+    objects = joined(how, LANGUAGES[target].subroutine.upper(), tmp_path)
     (tmp_path / "ask.f90").write_text(program)
     # overclosures, or pressures for conductance
     x = np.array([0.05, 0.4, 1.5]) if "uinter" in target else np.array([1e-5, 1e-3, 1e-2])
@@ -678,7 +677,7 @@ def test_several_laws_in_one_file_without_a_list_do_not_compile(target, tmp_path
         law_points.text(target, law, name=law, **HEAT) for law in ("mbma", "persson")
     ]
     of_another_version = re.sub(r"(MBMA_LAW_CODE (?:!= )?)0x\w+", r"\g<1>0x1", texts[1])
-    routine = LANGUAGES[target].subroutine.removesuffix(".c").upper()
+    routine = LANGUAGES[target].subroutine.upper()
     listed = f'#define {routine}_INTERFACES INTERFACE("MBMA", mbma) INTERFACE("PERSSON", persson)\n'
     refused = {"several laws in one file": "".join(texts)}
     refused["laws of different versions"] = listed + texts[0] + of_another_version

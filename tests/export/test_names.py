@@ -21,8 +21,8 @@ from mbma_tables import InputError, MbmaError, Surface, contact, contact_law
 from mbma_tables.cli import main
 from mbma_tables.export import LAWS, data
 from mbma_tables.export.fmu import fmu
+from mbma_tables.export.languages import LANGUAGES
 from mbma_tables.export.law_code import asked_law, text_of
-from mbma_tables.export.law_languages import LANGUAGES
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.text import inert
 from mbma_tables.theories.mbma.variants import get_variant
