@@ -62,7 +62,8 @@ def command(folder: str) -> list[str]:
         exported = "\n".join(
             f"{name} DATA" if kind == "DATA" else name for kind, name in names
         )
-        definition, library = pathlib.Path(folder, "python3.def"), f"{folder}/python3.lib"
+        definition = pathlib.Path(folder, "python3.def")
+        library = f"{folder}/python3.lib"
         definition.write_text(
             f"LIBRARY python3.dll\nEXPORTS\n{exported}\n", encoding="utf-8"
         )
@@ -91,16 +92,12 @@ class Build(build_ext):
             for name in ("CPPFLAGS", "CFLAGS", "LDFLAGS")
         ]
         with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor() as pool:
-            begun, extra = (
-                command(folder),
-                [option for options in given for option in options],
-            )
+            begun = command(folder)
+            extra = [option for options in given for option in options]
 
             def build(module: Extension) -> None:
-                name, path = (
-                    module.name.rpartition(".")[2],
-                    pathlib.Path(self.get_ext_fullpath(module.name)),
-                )
+                name = module.name.rpartition(".")[2]
+                path = pathlib.Path(self.get_ext_fullpath(module.name))
                 path.parent.mkdir(parents=True, exist_ok=True)
                 options = [
                     *FLAGS,

@@ -41,9 +41,11 @@ from mbma_tables.theories.calibrated.formulas import Law, Spectrum
 
 POINTS = 20_000
 HELD_OUT = 500
-MANY, GRID = 100_000, 256
+MANY = 100_000
+GRID = 256
 SURFACES = 2_000
-GAPS, MANY_GAPS = 100_000, 1_000_000
+GAPS = 100_000
+MANY_GAPS = 1_000_000
 CALLS = 10_000  # of one number: a loop of them, not its first ones
 DESIGNS = 20  # surfaces of a design loop, likewise
 NOMINAL_EXACT = 15_000  # islands/s, a rate to compare with that is not measured here
@@ -65,10 +67,8 @@ def peers(X: np.ndarray, mu: np.ndarray) -> dict[str, Callable[[], Any]]:
     if importlib.util.find_spec("interpn"):
         import interpn
 
-        starts, steps = (
-            np.array([n[0] for n in nodes]),
-            np.array([n[1] - n[0] for n in nodes]),
-        )
+        starts = np.array([n[0] for n in nodes])
+        steps = np.array([n[1] - n[0] for n in nodes])
         fast = interpn.MulticubicRegular.new(
             [GRID, GRID], starts, steps, np.ascontiguousarray(values)
         )
@@ -91,7 +91,8 @@ def _knots(
 def tables(rng: np.random.Generator) -> None:
     """The universal table against its past and others' interpolators."""
     universal = open_table("universal")
-    X, mu = rng.uniform(-6.25, 41.0, MANY), 10 ** rng.uniform(-8, 6, MANY)
+    X = rng.uniform(-6.25, 41.0, MANY)
+    mu = 10 ** rng.uniform(-8, 6, MANY)
     click.echo("\nUniversal table: Phi_F, Phi_A and the bound on their error at once")
     some = slice(HELD_OUT)
     exact = greenwood_tripp.solve(X[some], mu[some], rtol=1e-12)
@@ -189,12 +190,10 @@ def laws(rng: np.random.Generator) -> None:
     nodes = np.linspace(0, surface.h_max, 1000)
     values = law.pressure(nodes)
     linear = RegularGridInterpolator((nodes,), values)
-    one, point, forces, fresh = (
-        float(gaps[0]),
-        gaps[:1],
-        law.pressure(gaps),
-        itertools.count(1),
-    )
+    one = float(gaps[0])
+    point = gaps[:1]
+    forces = law.pressure(gaps)
+    fresh = itertools.count(1)
     taken = rounds(
         {
             "law": lambda: law.pressure(gaps),
@@ -248,7 +247,8 @@ def calibrated(rng: np.random.Generator) -> None:
     surface = Surface(0.8, 1.0, 64.0, 1.0, 3.3)
     u = rng.uniform(0.01, 3.3, GAPS)
     some = u[:HELD_OUT]
-    theory, law = Calibrated(), Law(Spectrum.self_affine(0.8, 64.0), 3.3)
+    theory = Calibrated()
+    law = Law(Spectrum.self_affine(0.8, 64.0), 3.3)
     taken = rounds(
         {
             "table": lambda: theory.answer(surface, u),
@@ -356,19 +356,17 @@ def fresh_process(rng: np.random.Generator) -> None:
             float(subprocess.check_output([sys.executable, "-c", code])) for _ in range(5)
         ]
         report(name, statistics.median(taken), "s", at_most=0.5)
-    command, taken = (
-        [
-            sys.executable,
-            "-m",
-            "mbma_tables",
-            "contact",
-            "--surface",
-            "concrete",
-            "-d",
-            "0.4",
-        ],
-        [],
-    )
+    command = [
+        sys.executable,
+        "-m",
+        "mbma_tables",
+        "contact",
+        "--surface",
+        "concrete",
+        "-d",
+        "0.4",
+    ]
+    taken = []
     for _ in range(5):
         start = time.perf_counter()
         subprocess.check_output(command)

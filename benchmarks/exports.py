@@ -16,7 +16,8 @@ from mbma_tables.export.c_code import FLAGS, SOURCES, write_code
 from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma.sums import QUADRATURE_SHARE
 
-POINTS, SURFACES = 20_000, 2000
+POINTS = 20_000
+SURFACES = 2000
 RTOL = 1e-8
 COMPILER = ("cc", *FLAGS, "-march=native", "-shared", "-fPIC")
 
@@ -24,17 +25,13 @@ COMPILER = ("cc", *FLAGS, "-march=native", "-shared", "-fPIC")
 def exported(rng: np.random.Generator) -> None:
     """Islands at random (X, mu), and totals of as many surfaces as gaps."""
     model = open_table("universal")
-    X, mu = (
-        rng.uniform(-5.0, 40.0, POINTS),
-        np.exp(rng.uniform(np.log(1e-7), np.log(1e6), POINTS)),
-    )
+    X = rng.uniform(-5.0, 40.0, POINTS)
+    mu = np.exp(rng.uniform(np.log(1e-7), np.log(1e6), POINTS))
     surfaces, apart = held_out(SURFACES, rng)
     heights = (surfaces.h_max - apart) / surfaces.h_rms, surfaces.h_max / surfaces.h_rms
-    islands, sums, bound = (
-        np.empty((POINTS, 3)),
-        np.empty((SURFACES, 4)),
-        np.empty(SURFACES),
-    )
+    islands = np.empty((POINTS, 3))
+    sums = np.empty((SURFACES, 4))
+    bound = np.empty(SURFACES)
     status = np.empty(SURFACES, np.uint8)
 
     def at(array: Any) -> ctypes.c_void_p:
@@ -54,11 +51,9 @@ def exported(rng: np.random.Generator) -> None:
         ctypes.c_void_p(function())
         for function in (library.mbma_table, library.mbma_model_variant)
     )
-    size, many, share = (
-        ctypes.c_size_t(POINTS),
-        ctypes.c_size_t(SURFACES),
-        ctypes.c_double(QUADRATURE_SHARE * RTOL),
-    )
+    size = ctypes.c_size_t(POINTS)
+    many = ctypes.c_size_t(SURFACES)
+    share = ctypes.c_double(QUADRATURE_SHARE * RTOL)
     known = [
         np.ascontiguousarray(column, dtype=float)
         for column in (surfaces.hurst, surfaces.zeta_1, *heights)
@@ -84,10 +79,8 @@ def exported(rng: np.random.Generator) -> None:
             ),
         }
     )
-    phi, total = (
-        model.answer(X, mu),
-        contact(surfaces, separation=apart, theory=Mbma(rtol=RTOL)),
-    )
+    phi = model.answer(X, mu)
+    total = contact(surfaces, separation=apart, theory=Mbma(rtol=RTOL))
     unit = surfaces.q0 * surfaces.s
     click.echo(f"\nExported C, {' '.join(FLAGS[1:])} -march=native")
     for name, entries, found, right in (

@@ -22,8 +22,13 @@ from mbma_tables import Bodies, Surface, contact, contact_law, greenwood_tripp, 
 from mbma_tables.theories.mbma.geometry import geometry
 from mbma_tables.theories.mbma.variants import get_variant
 
-MANY, SURFACES, DESIGNS, SOME, CALLS = 100_000, 2_000, 20, 1_000, 2_000
-SEED, ROUNDS = 7, 9
+MANY = 100_000
+SURFACES = 2_000
+DESIGNS = 20
+SOME = 1_000
+CALLS = 2_000
+SEED = 7
+ROUNDS = 9
 
 # evaluations of erf
 BEFORE: dict[str, float] = {
@@ -57,7 +62,8 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
     """Calls by name, with the number of answers of each."""
     rng = np.random.default_rng(SEED)
     universal = open_table("universal")
-    X, mu = rng.uniform(-6.25, 41.0, MANY), 10 ** rng.uniform(-8, 6, MANY)
+    X = rng.uniform(-6.25, 41.0, MANY)
+    mu = 10 ** rng.uniform(-8, 6, MANY)
     fields = geometry(
         np.linspace(1e-3, 4, MANY),
         np.full(MANY, 0.8),
@@ -66,7 +72,8 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
     )
     path = [np.ascontiguousarray(fields[name]) for name in ("X", "mu")]
     surfaces, gaps = held_out(SURFACES, rng)
-    one, fresh = Surface.named("asphalt"), itertools.count(1)
+    one = Surface.named("asphalt")
+    fresh = itertools.count(1)
     some, many = (
         rng.uniform(-one.h_max, 0.9999 * one.h_max, count) for count in (SOME, MANY)
     )
@@ -77,9 +84,11 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
 
     law = contact_law(one, theory="mbma")
     place = float((one.h_max + many[0]) / 2)
-    flat, u = Surface(0.8, 1.0, 64.0, 1.0, 3.3), rng.uniform(0.01, 3.3, MANY)
+    flat = Surface(0.8, 1.0, 64.0, 1.0, 3.3)
+    u = rng.uniform(0.01, 3.3, MANY)
     mean = (gaps + surfaces.h_max) / 2
-    calibrated, loads = contact(flat, mean_separation=u, theory="calibrated").pressure, {}
+    calibrated = contact(flat, mean_separation=u, theory="calibrated").pressure
+    loads = {}
     for nodes in (28, 96):
         # nodes follow from the accuracy asked
         loads[nodes] = (
@@ -149,7 +158,8 @@ def kernels() -> dict[str, tuple[Callable[[], Any], int]]:
 
 def measured(rounds: int = ROUNDS) -> dict[str, float]:
     """Times of an answer in evaluations of erf: the median over rounds, in each of which all take turns."""
-    runs, at = kernels(), np.random.default_rng(SEED).uniform(0.01, 3.3, MANY)
+    runs = kernels()
+    at = np.random.default_rng(SEED).uniform(0.01, 3.3, MANY)
     taken: dict[str, list[float]] = {name: [] for name in runs}
     for number in range(rounds + 1):
         for name, (run, count) in runs.items():

@@ -59,9 +59,11 @@ def maps(rng: np.random.Generator) -> None:
             {VARIABLE: before}
         )
     law = contact_law(surface, theory=FULL)
-    u, out = rng.uniform(0.2, 2.0, 100_000) * float(surface.h_rms), []
+    u = rng.uniform(0.2, 2.0, 100_000) * float(surface.h_rms)
+    out = []
     for _ in range(SEEDS):
-        hurst, shortest = rng.uniform(0.5, 0.9), rng.uniform(1.0, 4.0)
+        hurst = rng.uniform(0.5, 0.9)
+        shortest = rng.uniform(1.0, 4.0)
         bearing = Surface(hurst, 0.05, 6.0 / shortest, 0.5, 1.75, unit="um")
         start = time.process_time()
         describe_law(

@@ -33,11 +33,14 @@ def report(
     at_most: float | None = None,
 ) -> None:
     """Keep and print a number."""
-    wanted, met = "", None
+    wanted = ""
+    met = None
     if at_least is not None:
-        wanted, met = f">= {at_least:g}", value >= at_least
+        wanted = f">= {at_least:g}"
+        met = value >= at_least
     if at_most is not None:
-        wanted, met = f"<= {at_most:g}", value <= at_most
+        wanted = f"<= {at_most:g}"
+        met = value <= at_most
     LINES.append(
         Line(name, float(value), unit, wanted, None if met is None else bool(met))
     )

@@ -11,7 +11,8 @@ from benchmarks.rows import report
 from mbma_tables import InputError, Scene, Surface, contact
 from mbma_tables.theories import Mbma
 
-SCENES, GAPS = 200, 4
+SCENES = 200
+GAPS = 4
 WARMED = 20  # scenes before times count: modules are loaded and tables opened by then
 EFFECTS = (
     ("pressure", "area"),
@@ -67,10 +68,8 @@ def scenes(rng: np.random.Generator) -> None:
         surface = Surface(
             rng.uniform(0.3, 1), 1.0, 10 ** rng.uniform(0.7, 4), h_rms, h_max
         )
-        gaps, rtol = (
-            np.sort(rng.uniform(-0.5, 0.99, GAPS)) * h_max,
-            10 ** rng.uniform(-8, -1),
-        )
+        gaps = np.sort(rng.uniform(-0.5, 0.99, GAPS)) * h_max
+        rtol = 10 ** rng.uniform(-8, -1)
         effects = EFFECTS[number % len(EFFECTS)]
         extra: dict[str, Any] = (
             {"theories": ["greenwood_williamson"]} if "comparison" in effects else {}

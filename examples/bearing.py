@@ -26,14 +26,22 @@ from mbma_tables import Surface
 from mbma_tables.common.plots import to_picture
 from mbma_tables.export.law_rows import describe_law
 
-RADIUS, LENGTH, CLEARANCE = 25e-3, 25e-3, 25e-6  # m
-VISCOSITY, LOAD, BOUNDARY_FRICTION = 0.02, 5e3, 0.12  # Pa s, N, in contacts
+# m
+RADIUS = 25e-3
+LENGTH = 25e-3
+CLEARANCE = 25e-6
+# Pa s, N, in contacts
+VISCOSITY = 0.02
+LOAD = 5e3
+BOUNDARY_FRICTION = 0.12
 FACES = Surface(
     hurst=0.8, q0=5e4, q1=1.5e6, h_rms=0.5e-6, h_max=1.75e-6, unit="m"
 )  # both faces' roughness in one
 LAY = 3.0  # length of the roughness around the bearing over that along its axis
 SPEEDS = np.geomspace(0.02, 20, 16)  # m/s, of the journal's surface
-AROUND, ALONG = 120, 13  # points around the bearing and from its middle to its end
+# points around the bearing and from its middle to its end
+AROUND = 120
+ALONG = 13
 
 
 def film_table() -> dict[str, np.ndarray]:
@@ -46,9 +54,11 @@ def film_pressure(
     u: np.ndarray, phi: tuple[np.ndarray, np.ndarray], speed: float
 ) -> np.ndarray:
     """Pressure on AROUND x ALONG points, the last at the end; symmetric about the first; gap u around."""
-    dx, dy = 2 * np.pi * RADIUS / AROUND, LENGTH / 2 / (ALONG - 1)
+    dx = 2 * np.pi * RADIUS / AROUND
+    dy = LENGTH / 2 / (ALONG - 1)
     k_x, k_y = (factor * u**3 / (12 * VISCOSITY) for factor in phi)
-    index, j = np.arange(AROUND * ALONG).reshape(AROUND, ALONG), np.arange(ALONG)
+    index = np.arange(AROUND * ALONG).reshape(AROUND, ALONG)
+    j = np.arange(ALONG)
     beside = (
         np.roll(index, -1, 0),
         np.roll(index, 1, 0),
@@ -70,7 +80,8 @@ def film_pressure(
     while True:
         p = np.zeros(index.size)
         p[filled] = spsolve(A[filled][:, filled].tocsc(), b[filled])
-        before, filled = filled, inside & (p - (A @ p - b) / A.diagonal() > 0)
+        before = filled
+        filled = inside & (p - (A @ p - b) / A.diagonal() > 0)
         if (before == filled).all():
             return p.reshape(AROUND, ALONG)
 
@@ -110,7 +121,8 @@ def state(table: dict[str, np.ndarray], eccentricity: float, speed: float) -> St
 
 def stribeck(speeds: np.ndarray = SPEEDS) -> list[State]:
     """At each speed the state that carries LOAD."""
-    table, most = film_table(), 1 - 0.25 * float(FACES.h_rms) / CLEARANCE
+    table = film_table()
+    most = 1 - 0.25 * float(FACES.h_rms) / CLEARANCE
     ends = [
         (
             brentq(

@@ -32,12 +32,14 @@ from mbma_tables.quantities.conductances import cooper_mikic_yovanovich
 JOINT = Surface(
     hurst=0.8, q0=2 * np.pi / 1e-3, q1=2 * np.pi / 5e-6, h_rms=1.5e-6, h_max=5.5e-6
 )
-STEEL, ALUMINIUM = materials.get("steel 4140"), materials.get("aluminium 6061")
+STEEL = materials.get("steel 4140")
+ALUMINIUM = materials.get("aluminium 6061")
 E_STAR = float(
     materials.effective_modulus(STEEL.E * 1e9, STEEL.nu, ALUMINIUM.E * 1e9, ALUMINIUM.nu)
 )  # Pa
 SOFT, HARD = (1e9 * hardness for hardness in ALUMINIUM.hardness)
-K_STEEL, K_ALUMINIUM = STEEL.conductivity[0], float(np.mean(ALUMINIUM.conductivity))
+K_STEEL = STEEL.conductivity[0]
+K_ALUMINIUM = float(np.mean(ALUMINIUM.conductivity))
 K_MEAN = float(mean_conductivity(K_STEEL, K_ALUMINIUM))
 RANGE = (1e5, 5e7)  # Pa
 PRESSURES = (1e5, 1e6, 1e7, 5e7)  # Pa
@@ -74,7 +76,8 @@ def conductance_curve(points: int = 200) -> Curve:
     h = {
         p_m: K_MEAN / E_STAR * found.unloading_stiffness for p_m, found in joints.items()
     }
-    spread, slope = np.exp(joints[middle].scatter), np.sqrt(2 * JOINT.m2 / np.pi)
+    spread = np.exp(joints[middle].scatter)
+    slope = np.sqrt(2 * JOINT.m2 / np.pi)
     return Curve(
         pressure,
         joints[middle].unloading_stiffness,

@@ -30,9 +30,15 @@ FRACTURE = Surface(
     h_max=210e-6,
     unit="m",
 )
-E_STAR, VISCOSITY = 30e9, 1e-3  # Pa, Pa s: granite, water
+# Pa, Pa s: granite, water
+E_STAR = 30e9
+VISCOSITY = 1e-3
 STRESSES = np.array([0.5, 1, 2, 5, 10, 20, 50]) * 1e6  # Pa, effective
-NORMAL, PORE, WELL, EDGE = 25e6, 20e6, 0.1, 100.0  # Pa, Pa at the edge, m, m
+# Pa, Pa at the edge, m, m
+NORMAL = 25e6
+PORE = 20e6
+WELL = 0.1
+EDGE = 100.0
 WELL_PRESSURES = np.array([18, 15, 10, 5, 0]) * 1e6  # Pa
 
 
@@ -99,7 +105,8 @@ def command(out: pathlib.Path | None) -> None:
         figure = Figure(figsize=(6, 4), layout="constrained")
         axes = figure.subplots()
         rows = table.x > 0
-        p, k = table.x[rows] / 1e6, table.y[rows] ** 2 / 12
+        p = table.x[rows] / 1e6
+        k = table.y[rows] ** 2 / 12
         axes.loglog(p, k, label="w^2/12")
         axes.loglog(
             p,

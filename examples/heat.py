@@ -21,13 +21,13 @@ from mbma_tables.bodies import mean_conductivity
 from mbma_tables.common.plots import to_picture
 from mbma_tables.export.law_rows import describe_law
 
-HOLE, CONE, RIM, THICK = (
-    4e-3,
-    12e-3,
-    30e-3,
-    6e-3,
-)  # m: radii of the hole, of the pressed ring, of the plates
-STEEL, ALUMINIUM = materials.get("steel 4140"), materials.get("aluminium 6061")
+# m: radii of the hole, of the pressed ring, of the plates
+HOLE = 4e-3
+CONE = 12e-3
+RIM = 30e-3
+THICK = 6e-3
+STEEL = materials.get("steel 4140")
+ALUMINIUM = materials.get("aluminium 6061")
 CONDUCTIVITY = (
     STEEL.conductivity[0],
     float(np.mean(ALUMINIUM.conductivity)),
@@ -44,7 +44,9 @@ JOINT = Surface(
     unit="m",
 )
 HARDNESS = 0.6e9  # Pa, of the aluminium
-FORCE, FLUX = 5e3, 1e4  # N of the bolt; W/m^2 into the lower plate
+# N of the bolt; W/m^2 into the lower plate
+FORCE = 5e3
+FLUX = 1e4
 
 mesh = MeshQuad.init_tensor(
     np.linspace(HOLE, RIM, 53), np.linspace(0, THICK, 13)
@@ -95,7 +97,8 @@ def temperatures(h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     ]
     lower, upper = (face[np.argsort(basis.doflocs[0, face])] for face in faces)
     of_face = interface.assemble(top, h=h)[lower][:, lower].tocoo()
-    places, n = (lower, upper + basis.N), 2 * basis.N
+    places = (lower, upper + basis.N)
+    n = 2 * basis.N
     K = block_diag([k * conduction.assemble(basis) for k in CONDUCTIVITY], format="csr")
     for i, j, sign in ((0, 0, 1), (0, 1, -1), (1, 0, -1), (1, 1, 1)):
         K = K + coo_matrix(
@@ -123,7 +126,8 @@ def resistance(h: np.ndarray) -> float:
 )
 def command(out: pathlib.Path | None) -> None:
     """Heat through a bolted joint."""
-    p, table = pressure(top.global_coordinates()[0]), conductance_table()
+    p = pressure(top.global_coordinates()[0])
+    table = conductance_table()
     h = np.interp(p, *table)
     scatter = float(
         contact(

@@ -24,7 +24,11 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from mbma_tables import Surface, contact_law
 
-WIDTH, HEIGHT, E, NU = 40.0, 20.0, 200.0, 0.3  # mm, MPa
+# mm, MPa
+WIDTH = 40.0
+HEIGHT = 20.0
+E = 200.0
+NU = 0.3
 law = contact_law(Surface.named("concrete"), "13.3 MPa", theory="calibrated")  # mm, MPa
 trial = law.continued()
 

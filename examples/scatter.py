@@ -117,7 +117,8 @@ def main(out: pathlib.Path | None = None, samples: int = 200_000) -> Spread:
     nominal = contact(
         Surface(HURST[0], Q0, np.exp(LOG_Q1[0]), middle, CREST * middle), separation=GAP
     ).pressure
-    mean, error = spread.force.mean(), spread.force.std(ddof=1) / np.sqrt(samples)
+    mean = spread.force.mean()
+    error = spread.force.std(ddof=1) / np.sqrt(samples)
     click.echo(
         f"{samples} samples at d = {GAP} um, F/(A0 E*); the nominal surface gives {nominal:.4e}"
     )

@@ -75,7 +75,9 @@ def log_answers(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def simulate(best: Contact, x: np.ndarray, grid: int, seed: int) -> float:
     """Mean flow coefficient of face and track by boundary elements and Reynolds' equation, of one random cell."""
-    h_rms, hurst, zeta_1 = np.exp(x[0]), x[1], np.exp(x[2]) / Q0
+    h_rms = np.exp(x[0])
+    hurst = x[1]
+    zeta_1 = np.exp(x[2]) / Q0
     waves = round(grid / 4 / zeta_1)  # four points on the shortest
     k = np.hypot(np.fft.fftfreq(grid, 1 / grid)[:, None], np.fft.rfftfreq(grid, 1 / grid))
     phases = np.exp(2j * np.pi * np.random.default_rng(seed).random(k.shape))
@@ -134,10 +136,8 @@ def alike(x: np.ndarray, log_h_rms: np.ndarray) -> np.ndarray:
             axis=1,
         )
         heavy = answer(points).pressure.mean(axis=1) > LOAD
-        low, high = (
-            np.where(heavy, points[:, 3], low),
-            np.where(heavy, high, points[:, 3]),
-        )
+        low = np.where(heavy, points[:, 3], low)
+        high = np.where(heavy, high, points[:, 3])
     return np.asarray(answer(points).leakage.K.mean(axis=1))
 
 

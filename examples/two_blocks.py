@@ -13,9 +13,14 @@ import click
 
 from mbma_tables import Joint
 
-SIDE, HEIGHT, HOT = 10.0, 1.0, 100.0
-E, K = (205e3, 68.9e3), (42.7, 167.0)  # of steel and aluminium
-PRESSURE, FRICTION = 10.0, 0.2
+SIDE = 10.0
+HEIGHT = 1.0
+HOT = 100.0
+# of steel and aluminium
+E = (205e3, 68.9e3)
+K = (42.7, 167.0)
+PRESSURE = 10.0
+FRICTION = 0.2
 SHARES = (0.5, 2.0)  # shears over that at which the joint slips
 
 FACE = {"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}

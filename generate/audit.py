@@ -157,11 +157,10 @@ def bound(what: str, seed: int, scale: float) -> list[Found]:
     """Search for surfaces, gaps and tolerances at which an answer is farthest from its reference."""
     ratio, examples, options = BOUNDS[what]
     count = refused = beyond = 0
-    worst, where = 0.0, ""
-    phases, unchecked = (
-        [hypothesis.Phase.generate, hypothesis.Phase.target],
-        list(hypothesis.HealthCheck),
-    )
+    worst = 0.0
+    where = ""
+    phases = [hypothesis.Phase.generate, hypothesis.Phase.target]
+    unchecked = list(hypothesis.HealthCheck)
     options_of_search: dict[str, Any] = {
         "phases": phases,
         "suppress_health_check": unchecked,
@@ -191,10 +190,8 @@ def bound(what: str, seed: int, scale: float) -> list[Found]:
         count += ratios.size
         beyond += int((~(ratios <= 1)).sum())
         if largest > worst:
-            worst, where = (
-                largest,
-                f"{surface!r}, nearest={nearest:.4g}, digits={digits:.3g}",
-            )
+            worst = largest
+            where = f"{surface!r}, nearest={nearest:.4g}, digits={digits:.3g}"
         hypothesis.target(min(np.log(max(largest, 1e-12)), 50.0))
 
     search()
@@ -203,18 +200,19 @@ def bound(what: str, seed: int, scale: float) -> list[Found]:
 
 def validity(seed: int, scale: float) -> list[Found]:
     """Answers that are `valid` outside the ranges of the simulated surfaces in docs/data, or without a scatter."""
-    rng, tested_ones = (
-        np.random.default_rng(seed),
-        [one for one in evidence() if one.kind == "self_affine"],
-    )
+    rng = np.random.default_rng(seed)
+    tested_ones = [one for one in evidence() if one.kind == "self_affine"]
     areas = np.concatenate([one.area for one in tested_ones])
     ends = {
         "hurst": [float(one.node[1]) for one in tested_ones],
         "zeta_1": [one.zeta_1 for one in tested_ones],
     }
-    count, beyond, where = 0, 0, ""
+    count = 0
+    beyond = 0
+    where = ""
     for _ in range(int(1000 * scale)):
-        hurst, log_zeta = rng.uniform(0.02, 1.0), rng.uniform(np.log(3.1), np.log(1e4))
+        hurst = rng.uniform(0.02, 1.0)
+        log_zeta = rng.uniform(np.log(3.1), np.log(1e4))
         # so flat that no rms gradient is above one, which no theory is valid for
         surface = Surface(
             hurst, 1e-6, float(1e-6 * np.exp(log_zeta)), 1.0, rng.uniform(1.0, 20.0)
@@ -232,7 +230,8 @@ def validity(seed: int, scale: float) -> list[Found]:
             )
         spread = np.isfinite(found.area_scatter) & np.isfinite(found.scatter)
         wrong = np.asarray(found.valid) & (found.pressure > 0) & ~(tested & spread)
-        count, beyond = count + wrong.size, beyond + int(wrong.sum())
+        count = count + wrong.size
+        beyond = beyond + int(wrong.sum())
         where = where or (
             f"{theory}: {surface!r}, A/A0 = {found.area[wrong][0]:.3g}"
             if wrong.any()
@@ -402,7 +401,10 @@ def requests(rng: np.random.Generator) -> Iterator[tuple[str, Callable[[], Any]]
 
 def failures(seed: int, scale: float) -> list[Found]:
     """Warnings, untyped errors, values that are not finite, and requests of more than 10 s."""
-    count, refused, longest, slowest = 0, 0, 0.0, ""
+    count = 0
+    refused = 0
+    longest = 0.0
+    slowest = ""
     bad: dict[str, list[str]] = {
         "a warning": [],
         "an error of no type": [],
@@ -422,9 +424,11 @@ def failures(seed: int, scale: float) -> list[Found]:
         except Exception as fault:
             found = warned if isinstance(fault, Warning) else untyped
             found.append(f"{given}: {type(fault).__name__}: {fault!s:.200}")
-        count, taken = count + 1, time.perf_counter() - start
+        count = count + 1
+        taken = time.perf_counter() - start
         if taken > longest:
-            longest, slowest = taken, f"longest {taken:.2g} s: {given}"
+            longest = taken
+            slowest = f"longest {taken:.2g} s: {given}"
         if taken > LONGEST:
             slow.append(f"{given}: {taken:.2g} s")
     known = ((what, len(own), "\n  ".join(own)) for what, own in bad.items())
@@ -453,9 +457,11 @@ def routes(seed: int, scale: float) -> list[Found]:
         for name, route in asked_by.items():
             # what the joint answers each route answers too: an error is one more difference
             try:
-                ratios, where = np.concatenate(route(question)), repr(question)
+                ratios = np.concatenate(route(question))
+                where = repr(question)
             except MbmaError as fault:
-                ratios, where = np.array([np.inf]), f"{fault}: {question!r}"
+                ratios = np.array([np.inf])
+                where = f"{fault}: {question!r}"
             ratios = np.where(np.isnan(ratios), np.inf, ratios)
             counts[name] += ratios.size
             beyond[name] += int((ratios > 1).sum())

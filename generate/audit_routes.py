@@ -27,7 +27,9 @@ THEORIES = ("mbma", "calibrated", "persson")
 # relative: numbers pass through decimals, powers of ten of units and an inversion
 ROUNDED = 1e-12
 # pressures over the smaller of the hardness and a quarter of E* times the rms gradient
-LIGHT, HEAVY, PRESSURES = 1e-3, 0.3, 5
+LIGHT = 1e-3
+HEAVY = 0.3
+PRESSURES = 5
 QUANTITIES = (
     "area",
     "mean_separation",
@@ -206,7 +208,8 @@ def law_misses(
 
 def by_law(question: Question) -> list[FloatArray]:
     """`Joint.law` at the gaps of the contact, and the gaps that it gives for the pressures."""
-    law, answer = question.joint.law(), question.answer
+    law = question.joint.law()
+    answer = question.answer
     gaps = np.asarray(answer.mean_separation)
     values = {
         "pressure": law.pressure(gaps),
@@ -224,13 +227,12 @@ def by_law(question: Question) -> list[FloatArray]:
 
 def by_c(question: Question) -> list[FloatArray]:
     """The C of `Joint.export`, compiled, in mm and MPa."""
-    law, answer = question.joint.law(), question.answer
+    law = question.joint.law()
+    answer = question.answer
     gaps = np.asarray(answer.mean_separation)
     with tempfile.TemporaryDirectory() as folder:
-        source, library = (
-            pathlib.Path(folder, "joint.c"),
-            pathlib.Path(folder, "joint.so"),
-        )
+        source = pathlib.Path(folder, "joint.c")
+        library = pathlib.Path(folder, "joint.so")
         source.write_text(
             str(question.joint.export("c-law", name="joint")), encoding="utf-8"
         )

@@ -46,11 +46,10 @@ from mbma_tables.theories.calibrated.formulas import (
 from mbma_tables.theories.calibrated.map_curves import MAP_CONSTANTS
 from mbma_tables.theories.mbma.variants import REPORTED, Variant
 
-LOW, DEEP, HIGH = (
-    0.01,
-    0.1,
-    0.97,
-)  # A/A0 of the simulations between which distances are summed up
+# A/A0 of the simulations between which distances are summed up
+LOW = 0.01
+DEEP = 0.1
+HIGH = 0.97
 RANGES = ((LOW, DEEP), (DEEP, HIGH))
 OTHERS = ROOT / "generate" / "theories_of_others.py"
 HEADER = "theory | area at given pressure | pressure at given gap | stiffness at given pressure | loads reached"
@@ -144,7 +143,8 @@ def _simulated(
     kind: str, rows: Any, h_max: float, spectrum: Spectrum | None = None, **more: Any
 ) -> Case:
     """A surface of a file of numbers: rows of F/(A0 E* g), A/A0 and u/h_rms; of a self-affine one H and zeta_1."""
-    hurst, zeta_1 = more.pop("hurst", 0.8), more.pop("zeta_1", 0.0)
+    hurst = more.pop("hurst", 0.8)
+    zeta_1 = more.pop("zeta_1", 0.0)
     spectrum = spectrum or Spectrum.self_affine(hurst, zeta_1)
     force, area, u = (np.asarray(row, dtype=float) for row in rows)
     return Case(
@@ -165,7 +165,8 @@ def _simulated(
 
 def earlier() -> list[Case]:
     """The 105 surfaces of docs/data/boundary_elements.csv, to which the variant `fitted` was fitted."""
-    keys, found = ["hurst", "L_over_lambda0", "zeta_1", "seed", "n"], []
+    keys = ["hurst", "L_over_lambda0", "zeta_1", "seed", "n"]
+    found = []
     for (hurst, _, zeta_1, *_), own in read_csv("boundary_elements.csv").groupby(keys):
         rows = [own[name] for name in ("force", "area", "u_over_h_rms")]
         h_max = float(own["h_max_over_h_rms"].iloc[0])
@@ -195,10 +196,8 @@ def older(name: str, top: float | None = None) -> Case:
 def rolloff(number: int) -> Case:
     force, area, _, u = np.loadtxt(DATA / f"rolloff_{number}.csv", delimiter=",").T[:4]
     own = read_csv("rolloff_spectra.csv").query("map == @number")
-    spectrum, h_rms = (
-        Spectrum.from_shares(*own[["q", "variance"]].to_numpy().T),
-        np.sqrt(own["variance"].sum()),
-    )
+    spectrum = Spectrum.from_shares(*own[["q", "variance"]].to_numpy().T)
+    h_rms = np.sqrt(own["variance"].sum())
     # wavenumbers over h_rms: their unit cancels
     rows = [force / (spectrum.gradient * h_rms), area, u / h_rms]
     return _simulated("plateau", rows, ROLLOFF[number] / h_rms, spectrum)
@@ -223,7 +222,8 @@ def data_sets() -> dict[str, DataSet]:
             if one.kind in kinds and one.split in splits and low <= one.waves <= high
         ]
 
-    tested, plain = (HELD_OUT_SURFACE, HELD_OUT_SPECTRUM), ("self_affine",)
+    tested = (HELD_OUT_SURFACE, HELD_OUT_SPECTRUM)
+    plain = ("self_affine",)
     transformed = ("peaks", "valleys", "worn", "patchy")
     return {
         "spectra": DataSet("new spectra", chosen(plain, (HELD_OUT_SPECTRUM,))),
@@ -286,8 +286,10 @@ def pocket_errors() -> list[list[Any]]:
         "pressure at given separation": [],
     }
     for one in seen:
-        inside, spectrum = (one.area >= LOW) & (one.area <= HIGH), one.spectrum
-        force, g = one.force[inside], float(spectrum.gradient)
+        inside = (one.area >= LOW) & (one.area <= HIGH)
+        spectrum = one.spectrum
+        force = one.force[inside]
+        g = float(spectrum.gradient)
         pressure = pocket_pressure(one.u[inside], float(spectrum.narrowness)) / g
         laws = (
             pocket_area(force, float(spectrum.alpha)) / one.area[inside],
@@ -326,7 +328,8 @@ def theories_of(path: pathlib.Path) -> dict[str, Any]:
 
 def scores(theories: dict[str, Any]) -> str:
     """A table of theories, as objects or as functions of a `Case`, on all held-out self-affine surfaces."""
-    seen, rows = held_out(), []
+    seen = held_out()
+    rows = []
     for name, one in theories.items():
         found = distances(
             seen, one if isinstance(one, types.FunctionType) else _theory(one)

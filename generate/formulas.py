@@ -40,7 +40,9 @@ MODULE = ROOT / "mbma_tables" / "theories" / "mbma" / "closed_form_certificates.
 NUMBER = re.compile(r"\d[\d.]*(?:e-?\d+)?")
 WIDTH = 120
 DATA_DIGITS = 10
-MIN_DIGITS, MAX_DIGITS = 2, 15  # of a printed constant
+# of a printed constant
+MIN_DIGITS = 2
+MAX_DIGITS = 15
 LAWSON_ROUNDS = 80
 SUMS = ("log_Q", "near", "far")  # steps that have fitted coefficients
 SLACK = {"phi": 1.02, "totals": 1.01}  # what rounding may add to the largest error
@@ -48,8 +50,10 @@ SLACK = {"phi": 1.02, "totals": 1.01}  # what rounding may add to the largest er
 # islands
 SOLVED = 1e-10
 MIN_MU = 1e-6
-POINTS, HELD_OUT = 3000, 20_000
-FIT_SEED, HELD_OUT_SEED = 31, 32
+POINTS = 3000
+HELD_OUT = 20_000
+FIT_SEED = 31
+HELD_OUT_SEED = 32
 GRID = 300  # a side, of the check that both rise with X
 # Phi_rigid mu^-1/(limit of Phi) at large X: (pi/5) X^(5/2) over (4/3) X^(3/2)/sqrt(2), and (pi/2)
 # X^2 over (3 pi/8) (3 sqrt(32)/(3 pi))^(2/3) X^(4/3) mu^(-2/3)
@@ -60,9 +64,11 @@ MIN_AREA = 1e-6
 MARGIN = 0.7  # samples of the fit go down to this share of it
 MIN_PENETRATION = 0.03  # r below which no surface of the range reaches MARGIN*MIN_AREA
 OVERLAP = 0.02  # of k, by which the samples of the branches overlap
-TOTAL_POINTS, TOTAL_HELD_OUT = 40_000, 60_000
+TOTAL_POINTS = 40_000
+TOTAL_HELD_OUT = 60_000
 EDGE = 0.3  # share of each property that lies on an end of its range, where the error is largest
-TOTAL_SEED, TOTAL_HELD_OUT_SEED = 41, 42
+TOTAL_SEED = 41
+TOTAL_HELD_OUT_SEED = 42
 
 Samples = tuple[dict[str, FloatArray], dict[str, FloatArray]]  # arguments and results
 

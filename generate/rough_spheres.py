@@ -18,14 +18,15 @@ from generate.machined.makers import rough
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.data import FILE
 
-POINTS, SHORTEST, RADIUS, TOLERANCE = 320, 6.0, 3000.0, 1e-5
-HURSTS, LONGEST, HEIGHTS, EACH, FIRST_SEED = (
-    (0.5, 0.8),
-    (24.0, 48.0),
-    (0.1, 0.3, 1.0),
-    2,
-    71,
-)
+POINTS = 320
+SHORTEST = 6.0
+RADIUS = 3000.0
+TOLERANCE = 1e-5
+HURSTS = (0.5, 0.8)
+LONGEST = (24.0, 48.0)
+HEIGHTS = (0.1, 0.3, 1.0)
+EACH = 2
+FIRST_SEED = 71
 SMOOTH_RADII = (10.0, 20.0, 35.0, 60.0)  # of Hertz's contact at the loads
 
 
@@ -41,7 +42,8 @@ def simulated(z: FloatArray) -> Iterator[tuple[float, ...]]:
     contact = Contact(z - r**2 / (2 * RADIUS), (POINTS, POINTS), TOLERANCE, "dcfft")
     for a in SMOOTH_RADII:
         force = 4 / 3 * a**3 / RADIUS
-        found, pressure = contact.press(force / r.size), contact.traction
+        found = contact.press(force / r.size)
+        pressure = contact.traction
         yield (
             force,
             found["approach"],

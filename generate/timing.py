@@ -34,7 +34,9 @@ def measure(run: Callable[[], Any]) -> tuple[float, float]:
     seconds_of_work()
     # short runs are repeated until the clock and its calls no longer count
     calls = max(1, math.ceil(2e-3 / max(seconds_of(run), 1e-7)))
-    works, ratios, started = [seconds_of_work()], list[float](), time.process_time()
+    works = [seconds_of_work()]
+    ratios = list[float]()
+    started = time.process_time()
     while len(ratios) < ROUNDS[1] and (
         len(ratios) < ROUNDS[0] or time.process_time() - started <= BUDGET
     ):

@@ -68,10 +68,9 @@ Part = AnySurface | Mapping[str, Any]
 FACES = ("part_a", "part_b")
 EXAMPLE = '{"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}'
 LAW_RTOL = 1e-8  # of the polynomials of the joint's law
-RANGE, POINTS = (
-    (1e-5, 0.3),
-    41,
-)  # pressures over the hardness, and their number, in pictures
+# pressures over the hardness, and their number, in pictures
+RANGE = (1e-5, 0.3)
+POINTS = 41
 
 
 def equivalent(faces: Sequence[Any], nominal_area: Any) -> AnySurface:
@@ -677,7 +676,8 @@ class Joint(JointQuantities, Displayed):
     def _drawn(self, pressed: Contact) -> Figure:
         variables = self.quantities(pressed)
         x = variables["pressure"]
-        stiffness, gap = variables["stiffness"], variables["mean_separation"]
+        stiffness = variables["stiffness"]
+        gap = variables["mean_separation"]
         panels = {
             "real contact area  A/A0": ("area",),
             f"mean gap [{gap.unit}]": ("mean_separation",),

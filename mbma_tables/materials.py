@@ -73,7 +73,9 @@ _SCALE = re.compile(
     r"\s*([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?)\s*(HV|HRC|HRB|HBW?)\s*(?:([0-9]+\.?[0-9]*)/([0-9]+\.?[0-9]*))?[0-9./]*\s*"
 )
 # ranges of metals' constants: numbers outside are in another unit
-MODULI, HARDNESSES, CONDUCTIVITIES = (0.01, 2000.0), (1e-4, 150.0), (0.01, 5000.0)
+MODULI = (0.01, 2000.0)
+HARDNESSES = (1e-4, 150.0)
+CONDUCTIVITIES = (0.01, 5000.0)
 
 
 def _poisson(name: str, value: ArrayLike) -> FloatArray:
@@ -247,7 +249,8 @@ def _metals() -> tuple[dict[str, Metal], dict[tuple[str, ...], str]]:
     names: dict[tuple[str, ...], str] = {}
     lines = shipped_file("metals.csv").read_text(encoding="utf-8").splitlines()
     for row in csv.DictReader(line for line in lines if not line.startswith("#")):
-        name, scale = row["name"], row["scale"]
+        name = row["name"]
+        scale = row["scale"]
         tempers = []
         for end in TEMPERS:
             number = float(row[end])
@@ -470,17 +473,13 @@ def _pressure_of_number(
     if scale.startswith("HB"):
         load = BRINELL_LOAD
         if ball is not None and force is not None:
-            diameter, kilograms = (
-                positive_array("ball [mm]", float(ball)),
-                positive_array("force [kgf]", float(force)),
-            )
+            diameter = positive_array("ball [mm]", float(ball))
+            kilograms = positive_array("force [kgf]", float(force))
             load = float(kilograms / diameter**2)
         # depth h of the indentation: (d/D)^2 = 4 (h/D) (1 - h/D), h/D = load/(pi number)
         shallow, deep = ((1 - math.sqrt(1 - ratio**2)) / 2 for ratio in BRINELL_DIAMETERS)
-        least, most = (
-            math.ceil(load / (math.pi * deep)),
-            math.floor(load / (math.pi * shallow)),
-        )
+        least = math.ceil(load / (math.pi * deep))
+        most = math.floor(load / (math.pi * shallow))
         require(
             f"hardness [{scale}]", value, (value >= least) & (value <= most),
             f"from {least} to {most} at {load:g} kgf per square millimetre of the ball's diameter (ISO 6506-1); with "
@@ -521,10 +520,8 @@ def microhardness(surface: Any, c1: float | str, c2: float) -> str:
     """
     if surface.unit is None:
         raise InputError("microhardness depends on lengths: give the surface its unit")
-    one, index = (
-        positive_array("c1", Units(stress="GPa").number("pressure", c1)),
-        finite_array("c2", c2),
-    )
+    one = positive_array("c1", Units(stress="GPa").number("pressure", c1))
+    index = finite_array("c2", c2)
     require("c2", index, (index > -1) & (index <= 0), "in (-1, 0]")
     indent = (
         1.62
@@ -585,7 +582,8 @@ def tangential_ratio(
         raise InputError(
             "nu is one number, or two with E=(E1, E2), the moduli of the bodies"
         )
-    above, below = 1 - ratio * share(ratio), 1 - ratio
+    above = 1 - ratio * share(ratio)
+    below = 1 - ratio
     if E is None:
         return np.asarray(above / below)[()]
     modulus = positive_array(

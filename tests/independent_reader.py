@@ -98,7 +98,8 @@ class Reader:
     # lookup
 
     def position(self, name, x):
-        axis, nodes = self.described[name], self.variables[name].size
+        axis = self.described[name]
+        nodes = self.variables[name].size
         if not axis["first"] <= x <= axis["last"]:
             raise ValueError(f"{name} = {x} is not covered")
         ends = (axis["first"], axis["last"], x)
@@ -154,7 +155,8 @@ class Reader:
         if low == 0:
             y = 2 * mu / high - 1
         else:
-            a, b = math.sqrt(low), math.sqrt(high)
+            a = math.sqrt(low)
+            b = math.sqrt(high)
             y = (b + a) / (b - a) * (mu - a * b) / (mu + a * b)
         sums = {
             f: chebyshev(x) @ self.variables[f"chebyshev_{f}"][cell] @ chebyshev(y)
@@ -164,7 +166,8 @@ class Reader:
 
     def band(self, spread, sphere, hurst):
         """mu, sigma and rate of a band; sphere gives zeta_d."""
-        w, power = math.log1p(spread), 4 - 2 * hurst
+        w = math.log1p(spread)
+        power = 4 - 2 * hurst
 
         def g(p):
             return math.expm1(p * w) / (p * w) if p * w else 1.0
@@ -175,7 +178,8 @@ class Reader:
         rate = 0.75 * growth / json.loads(self.attributes["variant_numbers"])[0]
         inverse = sphere * 1.25**-power
         c = 0.75 * hurst / power
-        m4_d, m4_u = c * (1 - inverse), c * (math.exp(power * w) - inverse)
+        m4_d = c * (1 - inverse)
+        m4_u = c * (math.exp(power * w) - inverse)
         radius = 3 * math.sqrt(math.pi) / 8
         return (
             8 / 3 * rate * sigma * radius * math.sqrt(2) / (m4_d * m4_u) ** 0.25,
@@ -184,7 +188,8 @@ class Reader:
         )
 
     def island(self, delta_over_h_rms, zeta_d, zeta_u, hurst):
-        spread, power = (zeta_u - zeta_d) / zeta_d, 4 - 2 * hurst
+        spread = (zeta_u - zeta_d) / zeta_d
+        power = 4 - 2 * hurst
         sphere = (1.25 / zeta_d) ** power
         mu, sigma, rate = self.band(spread, sphere, hurst)
         X = (delta_over_h_rms * zeta_d**hurst - 1) / sigma
@@ -195,8 +200,11 @@ class Reader:
             f: math.exp(share * self.spline(f, (X, inside, sphere, hurst))) * rigid[f]
             for f in rigid
         }
-        c, radius = 0.75 * hurst / power, 3 * math.sqrt(math.pi) / 8
-        log_d, S, D = math.log(zeta_d), sigma * zeta_d**-hurst, rate * zeta_d**2
+        c = 0.75 * hurst / power
+        radius = 3 * math.sqrt(math.pi) / 8
+        log_d = math.log(zeta_d)
+        S = sigma * zeta_d**-hurst
+        D = rate * zeta_d**2
         R_d = radius / math.sqrt(c * math.expm1(power * log_d))
         R_u = radius / math.sqrt(c * math.expm1(power * (log_d + math.log1p(spread))))
         return {
@@ -206,7 +214,8 @@ class Reader:
 
     def replay(self):
         """Largest of |own answer/stored - 1|/tolerance over the conformance points."""
-        prefix, worst = "conformance_", 0.0
+        prefix = "conformance_"
+        worst = 0.0
         points = {
             n.removeprefix(prefix): values
             for n, values in self.variables.items()

@@ -73,7 +73,8 @@ def test_the_rule(expected, make):
 @pytest.mark.parametrize(("expected", "make"), KINDS)
 @pytest.mark.parametrize("by", PLACES)
 def test_contact_sensitivity_and_scene_of_one_question(expected, make, by):
-    surface, expected = make(), "mbma" if by == "separation" else expected
+    surface = make()
+    expected = "mbma" if by == "separation" else expected
     place = {by: PLACES[by]}
     found = contact_of(surface, E_STAR, **place)
     assert found.theory == expected

@@ -48,7 +48,8 @@ def thing(request):
 
 
 def test_a_line_and_a_notebooks_table_with_a_small_picture(monkeypatch, thing):
-    line, shown = repr(thing), thing._repr_html_()
+    line = repr(thing)
+    shown = thing._repr_html_()
     assert "\n" not in line
     assert len(line) < 400
     assert line.startswith(type(thing).__name__)

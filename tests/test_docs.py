@@ -42,7 +42,8 @@ MODULES = [
     for m in pkgutil.walk_packages(mbma_tables.__path__, "mbma_tables.")
     if "__main__" not in m.name
 ]
-README, TABLES = PAGES["README.md"], PAGES["tables.md"]
+README = PAGES["README.md"]
+TABLES = PAGES["tables.md"]
 
 
 @pytest.mark.parametrize(
@@ -127,7 +128,8 @@ def test_links_and_figures_of_pages_exist():
             r"\]\((?!https?:)([^)\s]*)\)", path.read_text(encoding="utf-8")
         ):
             file, _, anchor = target.partition("#")
-            found, links = (path.parent / file).resolve() if file else path, links + 1
+            found = (path.parent / file).resolve() if file else path
+            links = links + 1
             assert found.exists(), f"{path.name}: {target}"
             assert not anchor or anchor in anchors(found.read_text(encoding="utf-8")), (
                 f"{path.name}: {target}"

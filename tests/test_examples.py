@@ -43,7 +43,8 @@ def seal(tmp_path_factory):
 
 def direct(module, x):
     """log(pressure/LOAD) and log(conductance), contact by contact, written again from the statement."""
-    h_rms, h_max = np.exp(x[0]), module.CREST * np.exp(x[0])
+    h_rms = np.exp(x[0])
+    h_max = module.CREST * np.exp(x[0])
     face = Surface(x[1], module.Q0, np.exp(x[2]), h_rms, h_max)
     both = [
         contact(face, mean_separation=x[3] * h_max + deeper, theory="calibrated")
@@ -76,10 +77,8 @@ def test_seal_leaks_as_simulated(seal):
 
 def test_scatter_is_the_exact_island_model_sample_by_sample(tmp_path):
     module = load("scatter")
-    spread, lazy = (
-        module.main(tmp_path / "own.png", samples=20),
-        module.sample_surfaces(20),
-    )
+    spread = module.main(tmp_path / "own.png", samples=20)
+    lazy = module.sample_surfaces(20)
     numbers = np.stack(
         [getattr(lazy, name).compute() for name in ("hurst", "q1", "h_rms", "h_max")],
         axis=1,
@@ -161,7 +160,8 @@ def test_a_bearing_carries_its_load():
 
 def test_uniform_conductance_is_resistances_in_series():
     module = load("heat")
-    h, area = 2e4, np.pi * (module.RIM**2 - module.HOLE**2)
+    h = 2e4
+    area = np.pi * (module.RIM**2 - module.HOLE**2)
     own = module.resistance(np.full_like(module.top.global_coordinates()[0], h))
     k_1, k_2 = module.CONDUCTIVITY
     assert own == pytest.approx(

@@ -68,7 +68,8 @@ def visit(opened, address):
     """Opens the page in a state; nothing may fail or be fetched meanwhile."""
     from generate.explorer import visit
 
-    tabs, faults = [], []
+    tabs = []
+    faults = []
 
     def at(state="", **options):
         tab = visit(opened, f"{address}#{state}", **options)
@@ -120,7 +121,8 @@ def random_state(rng: np.random.Generator) -> dict:
 
 def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -> float:
     """Of the page's answers from the library's at the page's gaps, relative, in every quantity and theory."""
-    surface, worst = Surface(*(state[name] for name in NAMES)), 0.0
+    surface = Surface(*(state[name] for name in NAMES))
+    worst = 0.0
     for theory in ("mbma", "calibrated", "persson"):
         known = {
             name: found[f"{theory} {name}"]
@@ -145,13 +147,13 @@ def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -
             np.testing.assert_allclose(
                 found[f"{theory} scatter of ln {name}"][answered], scatter, rtol=1e-6
             )
-        force, area, stiffness = expected.pressure, expected.area, expected.stiffness
+        force = expected.pressure
+        area = expected.area
+        stiffness = expected.stiffness
         if theory == "mbma":
             # islands summed gap by gap, as the page does it
-            sums, depth = (
-                np.empty((5, answered.size)),
-                2 * (surface.h_max - options["mean_separation"]),
-            )
+            sums = np.empty((5, answered.size))
+            depth = 2 * (surface.h_max - options["mean_separation"])
             how = Mbma(variant=state["variant"], rtol=1e-11).sums
             by_table(
                 surface,
@@ -162,11 +164,9 @@ def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -
                 sums,
             )
             stress = state["E_star"] * surface.q0 * surface.s
-            force, area, stiffness = (
-                stress * sums[0],
-                sums[1],
-                2 * stress / surface.h_rms * sums[2],
-            )
+            force = stress * sums[0]
+            area = sums[1]
+            stiffness = 2 * stress / surface.h_rms * sums[2]
             area = (
                 -np.expm1(-area) if state["variant"] == "fitted" else area
             )  # the cover of its islands
@@ -198,7 +198,9 @@ def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -
 
 @pytest.mark.parametrize("number", [4, pytest.param(200, marks=pytest.mark.slow)])
 def test_curves_are_those_of_the_library(number, visit):
-    rng, tab, worst = np.random.default_rng(2026), visit(), []
+    rng = np.random.default_rng(2026)
+    tab = visit()
+    worst = []
     assert download(tab, "#csv") == tab.evaluate(CSV)
     for _ in range(number):
         state = random_state(rng)
@@ -303,7 +305,8 @@ def test_bad_numbers_are_told_beside_their_field(visit):
 @pytest.mark.parametrize("hardness", [0.05, 0.5, 5.0])
 def test_a_hardness_is_that_of_the_library(visit, against, hardness):
     """In E* = 13.3 MPa on the road, whose rms gradient is near 1/2: plasticity indices from 100 to 1."""
-    tab, road = visit(), Surface.named("concrete")
+    tab = visit()
+    road = Surface.named("concrete")
     tab.evaluate(
         GO,
         urllib.parse.urlencode(
@@ -355,7 +358,8 @@ def test_a_pasted_spectrum_is_answered_as_the_library_does(visit):
     tab.check("input[value=spectrum]")
     assert "paste two columns" in tab.inner_text("#error-spectrum")
     tab.fill("#spectrum", rows(SAMPLES, SPECTRUM))
-    found, surface = columns(tab), Surface.from_spectrum(SAMPLES, SPECTRUM, h_max=1.1)
+    found = columns(tab)
+    surface = Surface.from_spectrum(SAMPLES, SPECTRUM, h_max=1.1)
     for theory in ("calibrated", "persson"):
         expected = contact(
             surface, 13.3, mean_separation=found[f"{theory} gap"], theory=theory
@@ -399,15 +403,14 @@ def test_a_map_is_taken_by_its_spectrum_which_the_page_says(opened, tmp_path):
 def test_the_law_as_c_is_the_theory_and_names_the_librarys_own(theory, visit, tmp_path):
     if shutil.which("gcc") is None:
         pytest.skip("not installed: gcc")
-    path, own = tmp_path / "page.c", tmp_path / "own.c"
+    path = tmp_path / "page.c"
+    own = tmp_path / "own.c"
     path.write_text(
         download(visit(f"theory={theory}&h_rms=0.25"), "#law"), encoding="ascii"
     )
     compiled = functools.partial(compiled_law, name="law")
-    law, surface = (
-        compiled(path, "-std=c99"),
-        dataclasses.replace(Surface.named("concrete"), h_rms=0.25),
-    )
+    law = compiled(path, "-std=c99")
+    surface = dataclasses.replace(Surface.named("concrete"), h_rms=0.25)
     c = float(surface.h_max) * np.exp(
         np.random.default_rng(3).uniform(np.log(1e-4), np.log(0.99), 300)
     )

@@ -141,7 +141,8 @@ def scene_numbers(path):
 @pytest.mark.parametrize("name", SCENES)
 def test_scene_bytes(name, tmp_path):
     rng = np.random.default_rng(3)
-    path, text = tmp_path / "scene.toml", (EXAMPLES / name).read_bytes()
+    path = tmp_path / "scene.toml"
+    text = (EXAMPLES / name).read_bytes()
     for _ in range(60 * SCALE):
         content = spoilt(text, rng)
         path.write_bytes(content)

@@ -106,8 +106,10 @@ ISLAND_DIMENSIONS |= dict.fromkeys(("zeta_d", "zeta_u", "eta", "X", "mu", "error
 def test_units_that_are_powers_of_two_change_no_bit(
     surface, share, variant, power, stress
 ):
-    unit, modulus = 2.0**power, 2.0**stress
-    other, gap = in_unit(surface, unit), gaps_of(surface, share)
+    unit = 2.0**power
+    modulus = 2.0**stress
+    other = in_unit(surface, unit)
+    gap = gaps_of(surface, share)
     for name, degree in DIMENSIONS.items():
         assert getattr(other, name) == getattr(surface, name) * unit**degree, name
     one_island = island(surface, surface.h_max - gap, variant=variant)
@@ -141,11 +143,9 @@ def test_force_and_area_fall_in_the_gap_and_are_below_those_of_rigid_spheres(
     )
     found = Mbma(variant=variant).totals(surface, gaps, slopes=True)
     cell = 1.001 * surface.h_max / 199
-    some, delta, asked = (
-        gaps[1::8],
-        surface.h_max - gaps[1::8],
-        {"variant": variant, "island_model": "rigid"},
-    )
+    some = gaps[1::8]
+    delta = surface.h_max - gaps[1::8]
+    asked = {"variant": variant, "island_model": "rigid"}
     for elastic, rigid, load in (
         (
             contact(surface, separation=some, theory=Mbma(variant=variant)),
@@ -230,7 +230,8 @@ def test_a_law_and_its_inverse(surface, shares, variant, digits):
 
 
 def batch_of(rng, count):
-    hurst, zeta_1 = rng.uniform(0.4, 1, count), 10 ** rng.uniform(0.6, 3, count)
+    hurst = rng.uniform(0.4, 1, count)
+    zeta_1 = 10 ** rng.uniform(0.6, 3, count)
     top = rng.uniform(2.5, 4, count)
     share = np.where(rng.uniform(size=count) < 0.1, -0.1, rng.uniform(0.001, 0.8, count))
     return (hurst, 0.2, 0.2 * zeta_1, 0.3, 0.3 * top), 0.3 * top * (1 - share)
@@ -266,11 +267,9 @@ def test_no_entry_knows_the_others(island_model, seed):
         (totals, ("pressure", "area", "error")),
         (islands, ("force", "area", "error", "X", "mu", "eta")),
     ):
-        whole, mixed, folded = (
-            answer(np.arange(30)),
-            answer(order),
-            answer(order.reshape(5, 6)),
-        )
+        whole = answer(np.arange(30))
+        mixed = answer(order)
+        folded = answer(order.reshape(5, 6))
         for name in names:
             np.testing.assert_array_equal(
                 getattr(mixed, name), getattr(whole, name)[order]
@@ -282,7 +281,8 @@ def test_no_entry_knows_the_others(island_model, seed):
             alone = answer(k)
             if answer is totals and island_model == "universal":
                 for name in names[:2]:
-                    one, among = getattr(alone, name), getattr(whole, name)[k]
+                    one = getattr(alone, name)
+                    among = getattr(whole, name)[k]
                     assert (
                         np.abs(one - among) <= (alone.error + whole.error[k]) * among
                     ).all()

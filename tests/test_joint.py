@@ -65,7 +65,8 @@ def test_a_joint_is_the_contact_of_the_combined_surface(joint):
 
 
 def test_its_law_and_sensitivity(joint):
-    law, found = joint.law(), joint.at_pressure("10 MPa")
+    law = joint.law()
+    found = joint.at_pressure("10 MPa")
     assert float(law.at_pressure(0.01).mean_separation) == pytest.approx(
         float(found.mean_separation), rel=1e-5
     )
@@ -343,7 +344,8 @@ def test_parts_with_a_lay_have_a_direction():
 
 
 def test_effects_that_are_not_called_for_cost_nothing(joint, monkeypatch):
-    answer, calls = Calibrated.answer, []
+    answer = Calibrated.answer
+    calls = []
     monkeypatch.setattr(
         Calibrated, "answer", lambda *given: calls.append(1) or answer(*given)
     )
@@ -426,7 +428,8 @@ def test_a_nominal_area_is_of_a_map_too():
     named = {"map": heights / heights.std(), "dx": 1.0, "periodic": True, "unit": "um"}
     made = Surface.from_map(named["map"], 1.0, periodic=True, unit="um")
     given = {"bodies": "steel 1020", "nominal_area": "4 cm^2", "theory": "calibrated"}
-    one, other = Joint(named, **given), Joint(made, **given)
+    one = Joint(named, **given)
+    other = Joint(made, **given)
     assert one.surface.h_max == other.surface.h_max > made.h_max
 
 
@@ -532,7 +535,8 @@ def test_gases_against_kinetic_theory(gas, molar_mass):
     ratio = np.array(data.conductivity) / (np.array(data.viscosity) * capacity)
     np.testing.assert_allclose(ratio, eucken, rtol=0.06)
     # of engineering surfaces at 300 K, with the molar mass of iron; stated to 25%
-    effective, relative = molar_mass * (1.0 if monatomic else 1.4), molar_mass / 55.85
+    effective = molar_mass * (1.0 if monatomic else 1.4)
+    relative = molar_mass / 55.85
     clean = 2.4 * relative / (1 + relative) ** 2
     cold = np.exp(-0.57 * (300 - 273) / 273)
     expected = cold * effective / (6.8 + effective) + clean * (1 - cold)

@@ -330,7 +330,8 @@ def test_what_is_unpickled_in_a_new_process_answers_as_before(name, tmp_path):
 @pytest.mark.parametrize("theory", sorted(THEORIES))
 def test_a_worker_of_dask_has_the_bits_of_this_process(theory, hardness):
     """Workers are new processes, to which chunks of gaps and the question go by pickle."""
-    dask, xr = pytest.importorskip("dask"), pytest.importorskip("xarray")
+    dask = pytest.importorskip("dask")
+    xr = pytest.importorskip("xarray")
     gaps = xr.DataArray(np.linspace(0.5, 3.0, 24), dims="gap")
     eager = contact(ROUGH, Bodies(hardness=hardness), mean_separation=gaps, theory=theory)
     lazy = contact(
@@ -388,10 +389,8 @@ def test_numbers_lists_arrays_and_labels_have_the_same_bits(theory, given, hardn
     for kind, values in kinds.items():
         found = answers(values)
         for name in QUANTITIES:
-            expected, value = (
-                np.asarray(getattr(whole, name)),
-                np.asarray(getattr(found, name)),
-            )
+            expected = np.asarray(getattr(whole, name))
+            value = np.asarray(getattr(found, name))
             np.testing.assert_array_equal(
                 value.ravel(), expected, err_msg=f"{kind}: {name}"
             )
@@ -399,10 +398,8 @@ def test_numbers_lists_arrays_and_labels_have_the_same_bits(theory, given, hardn
         for number in (float(asked[place]), asked[place], np.array(asked[place])):
             found = answers(number)
             for name in QUANTITIES:
-                expected, value = (
-                    np.asarray(getattr(whole, name))[place],
-                    getattr(found, name),
-                )
+                expected = np.asarray(getattr(whole, name))[place]
+                value = getattr(found, name)
                 np.testing.assert_array_equal(
                     value, expected, err_msg=f"{type(number)}: {name}"
                 )
@@ -410,7 +407,8 @@ def test_numbers_lists_arrays_and_labels_have_the_same_bits(theory, given, hardn
 
 def test_an_island_and_a_lookup_are_the_same_of_a_number_and_of_an_array():
     """As contacts are."""
-    approach, X = np.linspace(0.01, 0.3, 7), np.linspace(0.5, 5.0, 7)
+    approach = np.linspace(0.01, 0.3, 7)
+    X = np.linspace(0.5, 5.0, 7)
     table = open_table("universal")
     whole = island(ROUGH, approach)
     for place in range(7):

@@ -19,7 +19,8 @@ SURFACE = Surface(0.7, 0.2, 60.0, 1.0, 3.0)
 
 def arrays_in(value):
     """Every array of a container or an object of the package, its surfaces apart, by a path to it."""
-    pending, seen = [(type(value).__name__, value)], {}
+    pending = [(type(value).__name__, value)]
+    seen = {}
     while pending:
         path, part = pending.pop()
         if id(part) in seen:

@@ -17,18 +17,14 @@ ROUNDS = 4  # of every question by every thread: about a million lookups in all
 
 @pytest.fixture(scope="module")
 def questions():
-    model, law = (
-        universal_model(),
-        contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0), theory="mbma"),
-    )
+    model = universal_model()
+    law = contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0), theory="mbma")
     X_axis, mu_axis = model.content.axes
 
     def phi(seed):
         rng = np.random.default_rng(seed)
-        X, mu = (
-            rng.uniform(X_axis.low, X_axis.high, ENTRIES),
-            10 ** rng.uniform(-12, np.log10(mu_axis.high), ENTRIES),
-        )
+        X = rng.uniform(X_axis.low, X_axis.high, ENTRIES)
+        mu = 10 ** rng.uniform(-12, np.log10(mu_axis.high), ENTRIES)
         return list(model.answer(X, mu))
 
     def laws(seed):
@@ -62,7 +58,8 @@ def test_sixteen_threads_give_the_bits_of_one(questions):
         for question in questions
         for seed in range(ROUNDS)
     }
-    barrier, keys = Barrier(THREADS), list(alone)
+    barrier = Barrier(THREADS)
+    keys = list(alone)
 
     def work(thread):
         barrier.wait()

@@ -134,11 +134,10 @@ def test_texts_that_are_refused(name, text):
 
 
 def test_two_surfaces_in_their_own_units():
-    one, other = (
-        Surface(0.8, 0.5, 100.0, 0.2, 0.6, unit="mm"),
-        Surface(0.8, 0.5e-3, 0.1, 200.0, 600.0, unit="um"),
-    )
-    both, same = one.combined(other), one.combined(one)
+    one = Surface(0.8, 0.5, 100.0, 0.2, 0.6, unit="mm")
+    other = Surface(0.8, 0.5e-3, 0.1, 200.0, 600.0, unit="um")
+    both = one.combined(other)
+    same = one.combined(one)
     assert both.unit == "mm"
     for name in ("h_rms", "h_max", "q0", "q1", "m2", "m4"):
         assert getattr(both, name) == pytest.approx(getattr(same, name), rel=1e-9)

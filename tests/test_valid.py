@@ -61,7 +61,8 @@ def within(deviations, scatters):
 @pytest.mark.parametrize("theory", ["calibrated", "persson"])
 def test_valid_contacts_of_five_numbers(simulations, theory):
     group = simulations["elastic"]
-    deviations, scatters = [], []
+    deviations = []
+    scatters = []
     for row in held_out(group):
         surface = five_numbers(group, row)
         gradient = float(surface.rms_gradient)
@@ -78,12 +79,14 @@ def test_valid_contacts_of_five_numbers(simulations, theory):
 
 def test_valid_contacts_that_yield(simulations):
     group = simulations["hardness"]
-    deviations, scatters = [], []
+    deviations = []
+    scatters = []
     for row in held_out(group):
         surface = five_numbers(group, row)
         gradient = float(surface.rms_gradient)
         for k, eta in enumerate(group["eta"].values):
-            force, simulated = group["force"].values[row, k], group["area"].values[row, k]
+            force = group["force"].values[row, k]
+            simulated = group["area"].values[row, k]
             reached = np.isfinite(force) & np.isfinite(simulated) & (force < eta)
             if not reached.any() or not np.isfinite(eta):
                 continue
@@ -102,7 +105,8 @@ def test_valid_contacts_that_yield(simulations):
 
 def test_valid_leakage(simulations):
     group = simulations["leakage"]
-    deviations, scatters = [], []
+    deviations = []
+    scatters = []
     for row in held_out(group):
         surface = five_numbers(group, row)
         gradient = float(surface.rms_gradient)

@@ -60,13 +60,15 @@ class Simulated:
         """What theories are given, q0 = h_rms = 1: five numbers, or the surface's own spectrum by bands."""
         if self.kind in ("self_affine", "yielded"):
             return Surface(float(self.node[1]), 1.0, self.zeta_1, 1.0, self.h_max)
-        x, variance = self.own_spectrum.x, self.own_spectrum.variance
+        x = self.own_spectrum.x
+        variance = self.own_spectrum.variance
         middle = np.sqrt(x[1:] * x[:-1])
         edges = np.concatenate(
             [[x[0] ** 2 / middle[0]], middle, [x[-1] ** 2 / middle[-1]]]
         )
         level = variance / (np.pi * np.diff(edges**2))
-        q, C = np.repeat(edges, 2)[1:-1], np.repeat(level, 2)
+        q = np.repeat(edges, 2)[1:-1]
+        C = np.repeat(level, 2)
         # of the mean square wavenumber that it has
         return MeasuredSurface(
             q, matched(q, C, 1.0, self.own_spectrum.gradient**2), self.h_max
@@ -83,7 +85,8 @@ class TheoryCurve:
     def __init__(self, theory: Any, surface: AnySurface) -> None:
         self._theory, self._surface = theory, surface
         self._g, self._h_rms = float(surface.rms_gradient), float(surface.h_rms)
-        u, pressure = DEPTHS * float(self._surface.h_max), PRESSURES * self._g
+        u = DEPTHS * float(self._surface.h_max)
+        pressure = PRESSURES * self._g
         with np.errstate(all="ignore"):
             if hasattr(theory, "answer"):
                 pressure, area, *_ = theory.answer(self._surface, u)
@@ -180,7 +183,8 @@ class Capped(Simulated):
     @functools.cached_property
     def elastic(self) -> tuple[FloatArray, FloatArray]:
         """Simulated force and stiffness at these gaps; by the law, fitted at its end, where not pressed so far."""
-        u, found = self.bare["u"], []
+        u = self.bare["u"]
+        found = []
         laws = self.by_law, self.law.contact(u[-1:])[::2]
         for name, beyond, end in zip(("force", "frozen"), *laws, strict=True):
             known = PchipInterpolator(u[::-1], np.log(self.bare[name][::-1]))
@@ -208,19 +212,22 @@ def simulated(data: xr.Dataset) -> Iterator[tuple[xr.Dataset, Simulated]]:
         data.isel(surface=number)
         for number in np.flatnonzero(data.split.values < SPLITS.index(REFINEMENT))
     ):
-        kind, hurst, zeta_1 = kinds[int(one.kind)], float(one.hurst), float(one.zeta_1)
-        share, x = one.band_variance.values, one.band_q.values
+        kind = kinds[int(one.kind)]
+        hurst = float(one.hurst)
+        zeta_1 = float(one.zeta_1)
+        share = one.band_variance.values
+        x = one.band_q.values
         own = Spectrum.from_shares(x[share > 0], share[share > 0])
         spectrum = (
             Spectrum.self_affine(hurst, zeta_1)
             if kind in ("self_affine", "yielded")
             else own
         )
-        node, waves = (
-            (kind, hurst, zeta_1, int(one.waves), float(one["shape"])),
-            int(one.waves),
-        )
-        split, points, h_max = SPLITS[int(one.split)], int(one.points), float(one.h_max)
+        node = (kind, hurst, zeta_1, int(one.waves), float(one["shape"]))
+        waves = int(one.waves)
+        split = SPLITS[int(one.split)]
+        points = int(one.points)
+        h_max = float(one.h_max)
         yield one, Simulated(kind, split, node, waves, points, spectrum, own, h_max)
 
 
@@ -266,11 +273,10 @@ def capped(data: xr.Dataset) -> list[Capped]:
     }
     names |= {"planes": "plane_separation", "frozen": "frozen_stiffness"}
     for one, known in simulated(data):
-        curves, u = curves_of(one), known.h_max * LEVELS[:-1]
-        law, by_map = (
-            Law(known.spectrum, known.h_max),
-            Curve(MapLaw(known.own_spectrum, **curves), known.h_max),
-        )
+        curves = curves_of(one)
+        u = known.h_max * LEVELS[:-1]
+        law = Law(known.spectrum, known.h_max)
+        by_map = Curve(MapLaw(known.own_spectrum, **curves), known.h_max)
         heights = hardness.BearingCurve(curves["mean_height"], known.h_max)
         force, _, stiffness = by_map.answer(u)
         levels = {

@@ -171,7 +171,8 @@ def _flags(values: Sequence[str], meanings: Sequence[str], name: str) -> xr.Vari
 def dataset(
     tasks: Sequence[Task], folder: pathlib.Path, kind: str = "elastic"
 ) -> xr.Dataset:
-    solved, found = [], []
+    solved = []
+    found = []
     for task in tasks:
         path = folder / f"{task.recipe.name}.npz"
         if path.exists():
@@ -180,7 +181,8 @@ def dataset(
                 found.append(dict(content))
     if not found:
         raise InputError(f"no surface of this campaign is in {folder}")
-    texts, recipes = TEXTS["files"][kind], [task.recipe for task in solved]
+    texts = TEXTS["files"][kind]
+    recipes = [task.recipe for task in solved]
     data = xr.Dataset({name: collected(name, found, kind) for name in texts["numbers"]})
     data["kind"] = _flags(
         [r.kind for r in recipes], sorted({r.kind for r in recipes}), "family of surfaces"
@@ -304,12 +306,15 @@ LIGHT_BANDS = (
     (8, 5),
     (16, 3.2),
 )  # longest wavelengths a side, and q1/q0
-LIGHT_HURSTS, LIGHT_SEEDS = (0.5, 0.8), (1, 2, 3, 4, 5)
+LIGHT_HURSTS = (0.5, 0.8)
+LIGHT_SEEDS = (1, 2, 3, 4, 5)
 LIGHT_BINS = (2e-4, 5e-4, 1e-3, 3e-3, 1e-2)  # A/A0
 
 JUMPS = np.array([0.03, 0.1, 0.3, 1.0, 3.0])  # of a gas's temperature [h_rms]
 AREAS = (0.003, 0.01, 0.03, 0.1, 0.2, 0.35, 0.55, 0.75)
-LIGHT, HEAVY = 0.05, 0.3  # contact fractions
+# contact fractions
+LIGHT = 0.05
+HEAVY = 0.3
 MANY = 3  # long waves a side from which the highest point is a surface's, not a map's
 GAP_HARDNESSES = {"fitted": (np.inf, 0.4, 0.1), "held out": (np.inf, 0.8, 0.2, 0.05)}
 PLAIN = "self_affine"
@@ -323,10 +328,12 @@ def solve(
     fine = heights(dataclasses.replace(recipe, points=finest))
     known = bearing(fine, recipe.sizes)
     surface = (fine / known.gradient)[:: finest // grid, :: finest // grid]
-    length, engine = known.h_rms / known.gradient, Contact(surface, recipe.sizes)
+    length = known.h_rms / known.gradient
+    engine = Contact(surface, recipe.sizes)
     for force in LOADS[::2]:
         # cold by an engine made for the load, continued from the pressures of the load below
-        before, started = seconds_of_work(), time.process_time()
+        before = seconds_of_work()
+        started = time.process_time()
         found = (Contact(surface, recipe.sizes) if start == "cold" else engine).press(
             force
         )
@@ -420,7 +427,8 @@ def measured_maps(maps: tuple[pathlib.Path, ...], data: pathlib.Path) -> None:
 def light_contacts(recipe: Recipe) -> FloatArray:
     """Highest point, A/A0 and mean separations [h_rms] at `LIGHT_LOADS`; NaN where a single point is in contact."""
     surface, _, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
-    model, rows = Contact(surface, recipe.sizes), np.full((3, LIGHT_LOADS.size), np.nan)
+    model = Contact(surface, recipe.sizes)
+    rows = np.full((3, LIGHT_LOADS.size), np.nan)
     rows[0] = known["h_max"]
     for k, load in enumerate(LIGHT_LOADS):
         try:
@@ -456,7 +464,8 @@ def compared(one: xr.Dataset) -> FloatArray:
 @click.option("--data", type=PATH, default=FILE, show_default=True)
 def light(data: pathlib.Path) -> None:
     """Simulate light loads on 60 surfaces, four minutes; `generate pages joints` compares."""
-    over, texts = ("surface", "load"), TEXTS["load"] | TEXTS["surface"]
+    over = ("surface", "load")
+    texts = TEXTS["load"] | TEXTS["surface"]
     design = itertools.product(LIGHT_BANDS, LIGHT_HURSTS, LIGHT_SEEDS)
     recipes = [
         Recipe(PLAIN, hurst, zeta_1, waves, seed, 256)
@@ -482,7 +491,8 @@ def gap_errors(kind: str) -> pd.DataFrame:
     The chain, from pressure and hardness by the calibrated law, is that of self-affine
     surfaces, else NaN.
     """
-    found, recipes = [], [Recipe(*row) for row in CAMPAIGNS["gaps"][kind]]
+    found = []
+    recipes = [Recipe(*row) for row in CAMPAIGNS["gaps"][kind]]
     for recipe, eta in itertools.product(recipes, GAP_HARDNESSES[kind]):
         surface, _, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
         h_rms = float(surface.std())
@@ -500,7 +510,8 @@ def gap_errors(kind: str) -> pd.DataFrame:
                 "waves": recipe.waves,
             }
             assert solved.pressure is not None
-            open_, gap = solved.pressure <= 0, solved.gap / h_rms
+            open_ = solved.pressure <= 0
+            gap = solved.gap / h_rms
             simulated = np.array([(open_ / (gap + jump)).mean() for jump in JUMPS])
             laws = {"law": mean_inverse(gap.mean(), 1 - open_.mean(), JUMPS, 1.0, eta)}
             laws |= {
@@ -525,10 +536,8 @@ def gaps() -> None:
     """Print errors of a gas's conductance against gaps of boundary elements, for docs/joints.md: six minutes."""
     for kind in GAP_HARDNESSES:
         known = gap_errors(kind)
-        light, many = (
-            known["area"] < LIGHT,
-            (known["waves"] >= MANY) & (known["area"] < HEAVY),
-        )
+        light = known["area"] < LIGHT
+        many = (known["waves"] >= MANY) & (known["area"] < HEAVY)
         law, one, chain = (
             100 * np.stack(known[name]) for name in ("law", "one gap", "chain")
         )

@@ -159,7 +159,8 @@ class Contact:
                 f"boundary elements at F/(A0 E*) = {force:g} end with a residual of {residual:.1e}"
             )
         seconds = time.process_time() - started
-        pressure, moved = self.traction, np.asarray(self.model.displacement)
+        pressure = self.traction
+        moved = np.asarray(self.model.displacement)
         if self._operator:
             self.model.operators[self._operator](pressure, moved)
         touching = pressure > 0
@@ -206,7 +207,8 @@ def prepared(
     known, (power, q, band) = bearing(surface, sizes), radial_bands(surface, sizes)
     powers = (band_sums(power * np.where(q > 0, q, 1) ** n, band) for n in (0, -2, 2, 4))
     variance, inverse, gradient, curvature = powers
-    per_variance, h_rms = 1 / np.where(variance > 0, variance, np.nan), known.h_rms
+    per_variance = 1 / np.where(variance > 0, variance, np.nan)
+    h_rms = known.h_rms
     plain = ("top_gradient", "tension_force", "tension", "anisotropy", "slope_kurtosis")
     curves: dict[str, Any] = {name: getattr(known, name) for name in plain}
     curves |= {
@@ -244,7 +246,8 @@ def pressed(
     wavenumber[0, 0] = np.inf
     weights = bearing_curve.half_plane_weights(surface.shape)
     contact = Contact(surface, sizes)
-    rows, shares = list[dict[str, float]](), list[FloatArray]()
+    rows = list[dict[str, float]]()
+    shares = list[FloatArray]()
     for force in (*LOADS, *HIGHER_LOADS):
         if force > LOADS[-1] and rows[-1]["area"] > FULL:
             break
@@ -297,7 +300,8 @@ def solve_flow(recipe: Recipe) -> dict[str, Any]:
     if recipe.kind == "yielded":
         contact = boundary_elements.Contact(surface, recipe.sizes, hardness=recipe.shape)
         loads = tuple(load_at(area, recipe.shape) for area in FLOW_AREAS)
-    rows, flows = list[dict[str, float]](), list[FloatArray]()
+    rows = list[dict[str, float]]()
+    flows = list[FloatArray]()
     for force in loads:
         rows.append(contact.press(force))
         flows.append(flow_conductance(contact.gap / h_rms, recipe.sizes))

@@ -86,7 +86,9 @@ def _half_plane(low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
     kept = (
         ((ky > 0) | (kx > 0)) & (squared >= low**2 - 1e-9) & (squared <= high**2 + 1e-9)
     )
-    kx, ky, squared = kx[kept], ky[kept], squared[kept]
+    kx = kx[kept]
+    ky = ky[kept]
+    squared = squared[kept]
     order = np.lexsort((ky, kx, squared))
     return kx[order], ky[order]
 

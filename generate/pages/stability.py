@@ -100,7 +100,8 @@ def outcome(answer: Callable[[], Answer], truth: Sequence[Number] | None) -> Out
         except MbmaError:
             return Outcome(refused=True)
         except (ArithmeticError, ValueError):
-            values, bound = ([math.nan], math.inf)
+            values = [math.nan]
+            bound = math.inf
     is_finite = bool(np.isfinite(np.array(values, float)).all())
     if truth is None or not is_finite:
         return Outcome(not_finite=not is_finite, warned=len(caught))

@@ -79,7 +79,8 @@ class Kind:
         self, count: int, first: int, drawn: Callable[[int], list[FloatArray]]
     ) -> list[FloatArray]:
         """Coordinates of at least `count` islands within the table's axes, of ever more random ones."""
-        draw, places = first, drawn(first)
+        draw = first
+        places = drawn(first)
         while places[0].size < count:
             draw *= 2
             if draw > MAX_DRAWS * count:
@@ -94,14 +95,16 @@ class Kind:
         self, errors: FloatArray, places: dict[str, FloatArray]
     ) -> dict[str, Any]:
         """Errors (points, 2) at places by name as attributes; the second half of the points is visited by surfaces."""
-        own, half = self.configuration, self.configuration.certificate_points // 2
+        own = self.configuration
+        half = self.configuration.certificate_points // 2
         if errors.max() > own.target:
             raise UncertifiedError(
                 f"{own.kind}: the largest held-out error is {errors.max():.2e}, the target {own.target:.2e}"
             )
         result: dict[str, Any] = {"certificate_points": own.certificate_points}
         for function, values in zip(FUNCTIONS, errors.T, strict=True):
-            visited, worst = values[half:], int(values.argmax())
+            visited = values[half:]
+            worst = int(values.argmax())
             result |= {
                 f"largest_error_{function}": float(values.max()),
                 f"p99_error_{function}": float(np.percentile(values, 99)),
@@ -147,7 +150,8 @@ def conformance(
     rounding of the arguments.
     """
     solved = greenwood_tripp.solve(X, mu, rtol=greenwood_tripp.MIN_SOLVER_RTOL)
-    exact, stored = scales * np.stack([solved.phi_F, solved.phi_A]), dict(arguments)
+    exact = scales * np.stack([solved.phi_F, solved.phi_A])
+    stored = dict(arguments)
     for number, function in enumerate(FUNCTIONS):
         stored |= {f"table_{function}": table[number], f"exact_{function}": exact[number]}
     # rounding of the arguments enters through X, whose digits cancel for a small sigma

@@ -44,11 +44,10 @@ class Configuration:
             name: {key: getattr(axis, key) for key in RANGE}
             for name, axis in self.axes.items()
         }
-        own, numbers = (
-            vars(self) | {"axes": ranges},
-            get_variant(self.variant).recorded if self.kind == ISLAND4D else [],
-        )
-        text, digest = json.dumps(own, sort_keys=True), digest_json([own, numbers])
+        own = vars(self) | {"axes": ranges}
+        numbers = get_variant(self.variant).recorded if self.kind == ISLAND4D else []
+        text = json.dumps(own, sort_keys=True)
+        digest = digest_json([own, numbers])
         return {
             "target": self.target,
             "configuration": text,
@@ -70,7 +69,8 @@ def load(
     try:
         json.dumps(own, allow_nan=False, default=str)
         check(own, SCHEMAS[kind])
-        merged, axes = given | own, dict[str, Axis]()
+        merged = given | own
+        axes = dict[str, Axis]()
         finer = (given["target"] / merged["target"]) ** (1 / (DEGREE + 1))
         for name, entry in given["axes"].items():
             nodes = (

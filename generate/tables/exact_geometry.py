@@ -53,7 +53,9 @@ def exact_island(
         D, sigma = summits(zeta_d, zeta_u)
         D_d, sigma_d = summits(mp.mpf(1), zeta_d)
         D_top = summits(mp.mpf(1), z1)[0]
-        R_d, R_u, R_top = radius(zeta_d), radius(zeta_u), radius(z1)
+        R_d = radius(zeta_d)
+        R_u = radius(zeta_u)
+        R_top = radius(z1)
         h_d = mp.sqrt(zeta_d ** (-2 * h) - e)  # (B.3)
         h_u = mp.sqrt(zeta_u ** (-2 * h) - e)  # (B.12)
         # (39), phi = 0.05
@@ -64,10 +66,8 @@ def exact_island(
             * mp.cbrt(1.5 * R_top) ** 2
             * mp.cbrt(20 * h_u / R_u)
         )
-        X, mu = (
-            (delta / s - h_d) / sigma,
-            mp.mpf(8) / 3 * D * sigma * mp.sqrt(2 * R_u * R_d),
-        )
+        X = (delta / s - h_d) / sigma
+        mu = mp.mpf(8) / 3 * D * sigma * mp.sqrt(2 * R_u * R_d)
         found = {
             "zeta_d": zeta_d,
             "zeta_u": zeta_u,

@@ -197,10 +197,8 @@ class Island4d(Kind):
         mu, sigma, _, _ = band_fields(
             *np.meshgrid(spread, sphere, hurst, indexing="ij"), self.variant
         )
-        names, inverse = (
-            tuple(axis.name for axis in axes),
-            1 / from_axes(sphere[:, None], hurst),
-        )
+        names = tuple(axis.name for axis in axes)
+        inverse = 1 / from_axes(sphere[:, None], hurst)
         found: dict[str, Any] = {
             "mu": (names[1:], mu, label(TEXTS["axes"]["mu"])),
             "sigma": (
@@ -218,11 +216,9 @@ class Island4d(Kind):
             text = f"natural logarithm of Phi_{f} over its value for a rigid sphere, at the nodes"
             found[f"log_ratio_{f}"] = (names, log_ratio[..., number], label(text))
         for axis in axes:
-            cells, cell, knot = (
-                error_cells(axis),
-                f"{axis.name}_cell",
-                f"{axis.name}_knot",
-            )
+            cells = error_cells(axis)
+            cell = f"{axis.name}_cell"
+            knot = f"{axis.name}_knot"
             middles = axis.coordinate(
                 (np.arange(cells) + 0.5) * ((axis.nodes - 1) / cells)
             )
@@ -269,7 +265,8 @@ class Island4d(Kind):
         X, spread, sphere, hurst = places
         zeta_d = from_axes(sphere, hurst)
         sigma = band_fields(spread, sphere, hurst, self.variant)[1]
-        delta, zeta_u = (X * sigma + 1) * zeta_d**-hurst, zeta_d * (1 + spread)
+        delta = (X * sigma + 1) * zeta_d**-hurst
+        zeta_u = zeta_d * (1 + spread)
         raw = {
             "delta_over_h_rms": delta,
             "zeta_d": zeta_d,
@@ -277,10 +274,8 @@ class Island4d(Kind):
             "hurst": hurst,
         }
         found = to_axes(delta, zeta_d, zeta_u, hurst, self.variant)
-        scales, rigid = (
-            np.stack([found.force, found.area]),
-            greenwood_tripp.rigid_sphere(found.X, found.mu),
-        )
+        scales = np.stack([found.force, found.area])
+        rigid = greenwood_tripp.rigid_sphere(found.X, found.mu)
         positions = [axis.position(x) for axis, x in zip(axes, found[:4], strict=True)]
         table = scales * np.exp(evaluate(coefs, positions).T) * rigid
         return conformance(

@@ -108,11 +108,15 @@ class Strip:
         """
         last = (int(np.float64(self.mu_high).view(np.int64) - 1) >> BUCKET_BITS) + 1
         rows: list[FloatArray] = []
-        edge, length, low = 0, 0, 0.0
+        edge = 0
+        length = 0
+        low = 0.0
         while low < self.mu_high:
             # an edge by its bits; the first cell is searched by halves, others start from
             # the one before
-            best, least, most = None, edge + 1 if edge else last - FIRST_BUCKETS, last
+            best = None
+            least = edge + 1 if edge else last - FIRST_BUCKETS
+            most = last
             trial = last if edge == 0 else min(edge + length, last)
             while least <= trial <= most:
                 high = min(
@@ -120,7 +124,8 @@ class Strip:
                 )
                 series, errors = self.cell(low, high)
                 if errors.max() <= self.aim:
-                    best, least = (trial, high, series, errors), trial + 1
+                    best = (trial, high, series, errors)
+                    least = trial + 1
                 else:
                     most = trial - 1
                 trial = (
@@ -132,7 +137,8 @@ class Strip:
                 )
             if best is None:
                 return None
-            length, edge = best[0] - edge, best[0]
+            length = best[0] - edge
+            edge = best[0]
             rows.append(
                 np.concatenate(
                     [[self.low, self.high, low, best[1]], best[3], best[2].ravel()]
@@ -163,7 +169,9 @@ class Universal(Kind):
     def strips(self) -> list[Strip]:
         """Ranges of X, each as wide as polynomials allow."""
         X, mu = (self.configuration.axes[name] for name in ("X", "mu"))
-        strips, low, width = list[Strip](), X.low, 1
+        strips = list[Strip]()
+        low = X.low
+        width = 1
 
         def strip(steps: int) -> Strip:
             high = min(low + steps / X_STEPS, X.high)
@@ -184,10 +192,8 @@ class Universal(Kind):
         return strips
 
     def build(self) -> TableContent:
-        own, jobs = (
-            self.configuration,
-            [dataclasses.astuple(strip) for strip in self.strips()],
-        )
+        own = self.configuration
+        jobs = [dataclasses.astuple(strip) for strip in self.strips()]
         rows = np.concatenate([*results("cells", cells_of, jobs, self.workers)])
         if len(rows) * TERMS**2 > own.max_nodes:
             raise UncertifiedError(
@@ -270,7 +276,8 @@ class Universal(Kind):
             content.auxiliary[name][1][:, None] for name in CELL_EDGES
         )
         x, y = (g.ravel() for g in np.meshgrid(*2 * [np.linspace(-0.99, 0.99, 5)]))
-        X, mu = X_at(x, X_low, X_high).ravel(), mu_at(y, mu_low, mu_high).ravel()
+        X = X_at(x, X_low, X_high).ravel()
+        mu = mu_at(y, mu_low, mu_high).ravel()
         answer = UniversalModel(content).answer
         found = np.stack(answer(X, mu)[:2])
         beside = (

@@ -321,10 +321,8 @@ def fit_command(
     columns, told = table_of_loads(surface, scale, full if simulate else theory)
     if simulate and output.out is not None and output.out.suffix == ".nc":
         full.of(surface).to_netcdf(output.out)
-        told, output = (
-            [*told, f"{output.out} has the simulation"],
-            output._replace(out=None),
-        )
+        told = [*told, f"{output.out} has the simulation"]
+        output = output._replace(out=None)
     units = Units(surface.unit, "1" if modulus is None else stress_unit)
     facts: dict[str, Any] = {name: getattr(surface, name) for name in MEASURED} | {
         "areal": areal(surface)

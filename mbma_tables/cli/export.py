@@ -133,7 +133,8 @@ def export_command(target: str, out: Path, **values: Any) -> None:
         for name, value in values.items()
         if value is not None and value != DEFAULTS.get(name)
     }
-    kind, code = targets()[target], target in targets("CODE")
+    kind = targets()[target]
+    code = target in targets("CODE")
     words = {"specimen": "the surface", "kappa": "--nu"}
     taken = kind.takes if code else kind.takes | {"specimen"}
     if unused := [
@@ -274,7 +275,8 @@ def explore_command(
     """
     from mbma_tables.export.explorer import explorer_page
 
-    stress, title = specimen.stress_unit, specimen.title
+    stress = specimen.stress_unit
+    title = specimen.title
     page = explorer_page(
         specimen.surface, specimen.E_star, stress, theory, variant, title, hardness
     )

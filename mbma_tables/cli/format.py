@@ -87,10 +87,8 @@ class Report:
         lines = []
         for name, values in self.columns.items():
             cells = [name, *([units[name]] if units else []), *map(_rounded, values)]
-            width, text = (
-                max(map(len, cells)),
-                any(isinstance(value, str) for value in values),
-            )
+            width = max(map(len, cells))
+            text = any(isinstance(value, str) for value in values)
             lines.append(
                 [cell.ljust(width) if text else cell.rjust(width) for cell in cells]
             )
@@ -227,7 +225,8 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
 
 def _validity(answer: Contact, yields: bool) -> tuple[list[str], dict[str, Any]]:
     """Range in which a contact's theory was tested, and its scatter: lines of text, and machine-readable facts."""
-    valid, notes = np.atleast_1d(answer.valid), []
+    valid = np.atleast_1d(answer.valid)
+    notes = []
     reasons = {
         reason: np.flatnonzero(mask).tolist() for reason, mask in answer.reasons.items()
     }
@@ -293,6 +292,7 @@ def report_answer(
                 f"hardness {model.hardness}: psi {answer.psi:.3g}, elastic up to {ELASTIC_PSI:g} (from {limit} on)"
             )
         told, validity = _validity(answer, model.yields)
-        notes, facts = notes + told, facts | validity
+        notes = notes + told
+        facts = facts | validity
     own = {name: shown_unit(name, specimen.units) for name in values}
     return Report(command, specimen.title, notes, facts, values, own | dict(units))

@@ -181,7 +181,8 @@ def given_values(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def _specimen(given: Mapping[str, Any]) -> Specimen:
     """The surface that the options describe, with its modulus; a modulus option overrides that of a file."""
-    length, stress = given["length_unit"], given["stress_unit"]
+    length = given["length_unit"]
+    stress = given["stress_unit"]
     known = (*specimens.NUMBERS, *specimens.MAP_OPTIONS, "map", "model")
     surface = given_values(
         {"name": given["surface"]} | {name: given[name] for name in known}
@@ -207,10 +208,8 @@ def _specimen(given: Mapping[str, Any]) -> Specimen:
 
 def _option(name: str, help: str, **kind: Any) -> Decorator:
     """The option for one argument of the library, by its name; a quantity unless another kind is given."""
-    flag, kind = (
-        f"--{name.replace('_', '-')}",
-        kind or {"callback": _parse_number, "metavar": "X[UNIT]"},
-    )
+    flag = f"--{name.replace('_', '-')}"
+    kind = kind or {"callback": _parse_number, "metavar": "X[UNIT]"}
     return click.option(flag, name.partition("/")[0], help=help, **kind)
 
 

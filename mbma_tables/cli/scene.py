@@ -94,10 +94,8 @@ def run_command(file: Path, out: Path | None, as_json: bool) -> None:
         if math.isfinite(facts["error"])
         else "error not known"
     )
-    notes, units = (
-        [f"{made}, rtol {facts['rtol']:.3g}, {error}"],
-        {n: f.attrs["units"] for n, f in fields.items()},
-    )
+    notes = [f"{made}, rtol {facts['rtol']:.3g}, {error}"]
+    units = {n: f.attrs["units"] for n, f in fields.items()}
     values = {name: field.values for name, field in fields.items()}
     report = Report("run", str(facts["title"]), notes, dict(facts), values, units)
     if out is not None:

@@ -48,10 +48,8 @@ def _verified(table: str) -> tuple[dict[str, Any], str]:
 
         theory = BoundaryElements.from_netcdf(table)
         answer = theory.answer(theory.surface, theory.rows[2])
-        error, loads = (
-            float(np.abs(np.array(answer[:2]) / theory.rows[:2] - 1).max()),
-            theory.rows.shape[1],
-        )
+        error = float(np.abs(np.array(answer[:2]) / theory.rows[:2] - 1).max())
+        loads = theory.rows.shape[1]
         if not error <= FAITHFUL:
             raise TableFileError(
                 f"{table}: its curves miss its simulated loads by {error:.1e}; {OWN_REMEDY}"
@@ -82,17 +80,16 @@ def info_command(table: str, as_json: bool) -> None:
     entries: dict[str, Any]
     if holds_own(table):
         values, attributes = read_own(table)
-        kind, entries = (
-            "variables",
-            {name: [float(v.min()), float(v.max())] for name, v in values.items()},
-        )
+        kind = "variables"
+        entries = {name: [float(v.min()), float(v.max())] for name, v in values.items()}
         lines = [
             f"variable {name}: {values[name].size} numbers, {a:g} to {b:g}"
             for name, (a, b) in entries.items()
         ]
     else:
         content = read_table(*_place(table))
-        kind, attributes = "axes", content.attributes
+        kind = "axes"
+        attributes = content.attributes
         entries = {
             axis.name: {**axis.attributes(), "nodes": axis.nodes} for axis in content.axes
         }
@@ -128,7 +125,8 @@ def cache_command(clear: bool, as_json: bool) -> None:
 
     Example: mbma cache --clear
     """
-    place, removed = cache.folder(), cache.trim(0) if clear else 0
+    place = cache.folder()
+    removed = cache.trim(0) if clear else 0
     kept = cache.files()
     size = sum(stat.st_size for _, stat in kept)
     facts = {

@@ -60,7 +60,8 @@ def load(name: str, **shapes: tuple[int, ...]) -> dict[str, FloatArray] | None:
         content = read_file(path, MAX_BYTES)
     except InputError:
         return None
-    checksum, packed = content[:DIGEST], content[DIGEST:]
+    checksum = content[:DIGEST]
+    packed = content[DIGEST:]
     if hashlib.sha256(packed).digest() != checksum:
         return None
     with np.load(io.BytesIO(packed), allow_pickle=False) as archive:
@@ -104,7 +105,8 @@ def files() -> list[tuple[pathlib.Path, os.stat_result]]:
 
 def trim(most: int = MAX_BYTES) -> int:
     """Remove files, least recently used first, until the rest has at most so many bytes; returns how many."""
-    kept, removed = files(), 0
+    kept = files()
+    removed = 0
     size = sum(stat.st_size for _, stat in kept)
     for path, stat in kept:
         if size <= most:

@@ -162,7 +162,8 @@ def saved(figure: Figure, path: str | os.PathLike[str] | None) -> Figure:
 
 def dataset_of(variables: Mapping[str, Variable], facts: Mapping[str, str]) -> xr.Dataset:
     """An xarray Dataset of variables, with facts as its attributes."""
-    xarray, made = needed("xarray"), {}
+    xarray = needed("xarray")
+    made = {}
     for name, (values, unit, meaning, dims) in variables.items():
         described = {"units": unit} | ({"long_name": meaning} if meaning else {})
         if is_labelled(values):

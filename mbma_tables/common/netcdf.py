@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 REMEDY = "rebuild it with `python -m generate tables {}` or reinstall mbma_tables"
 # tables of a user's own surface, BEM results of one map
-OWN, OWN_FORMAT = "simulated_map", "2.0"
+OWN = "simulated_map"
+OWN_FORMAT = "2.0"
 OWN_REMEDY = "make it anew: `mbma fit MAP --simulate --out OWN.nc`"
 SEAL = b"\nmbma-table sha256 "
 SEAL_LENGTH = len(SEAL) + 64 + 1
@@ -89,7 +90,8 @@ def read_sealed(path: pathlib.Path, remedy: str = REMEDY.format("all")) -> bytes
         raise TableFileError(
             f"{path}: {str(fault).removeprefix(f'{path} ')}; {remedy}"
         ) from None
-    body, seal = content[:-SEAL_LENGTH], content[-SEAL_LENGTH:]
+    body = content[:-SEAL_LENGTH]
+    seal = content[-SEAL_LENGTH:]
     if not seal.startswith(SEAL) or not seal.endswith(b"\n"):
         raise TableFileError(
             f"{path}: is not a table file, or is cut short (no checksum at its end); {remedy}"
@@ -163,10 +165,8 @@ def verified(
 def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
     """The table in an open file of known kind and format."""
     own, described, values = verified(dataset, schema.REQUIRED)
-    names, fields = (
-        [name for name, _ in schema.AXES[kind]],
-        ("long_name", "transform", "offset", "first", "last"),
-    )
+    names = [name for name, _ in schema.AXES[kind]]
+    fields = ("long_name", "transform", "offset", "first", "last")
     axes = tuple(
         schema.Axis(*(name, *map(described[name].__getitem__, fields), values[name].size))
         for name in names

@@ -131,7 +131,8 @@ def draw_compression(
                 raise InputError(
                     f"{curve.label!r} has no contact to draw on logarithmic axes"
                 )
-            x, y = getattr(curve, x_name), getattr(curve, y_name)
+            x = getattr(curve, x_name)
+            y = getattr(curve, y_name)
             if y is not None:
                 y = np.where(touches & (np.asarray(y) > 0), y, np.nan)
                 axes.plot(

@@ -14,7 +14,8 @@ PATIENCE = 2.0  # seconds before the first display
 WIPE = "\r\x1b[K"
 
 _doing = ["working"]  # the innermost task last
-_ended, _visible = threading.Event(), threading.Event()
+_ended = threading.Event()
+_visible = threading.Event()
 
 
 def doing(what: str) -> None:

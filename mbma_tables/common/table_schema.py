@@ -41,10 +41,9 @@ CELL_EDGES = {
 }
 # largest logarithm of a ratio to the rigid sphere; in the shipped tables below 20
 MAX_LOG_RATIO = 100.0
-MAX_BUCKETS, MAX_STEPS = (
-    4096,
-    30_000,
-)  # largest numbers of buckets of mu, eight per octave, and of X
+# largest numbers of buckets of mu, eight per octave, and of X
+MAX_BUCKETS = 4096
+MAX_STEPS = 30_000
 TERMS = 8  # terms of a Chebyshev series
 LIMITS = {
     "mu": (0.0, np.inf),

@@ -123,7 +123,8 @@ def read(name: str, text: str) -> tuple[float, str | None]:
         raise InputError(
             f"{name} must be a number, or one with its unit, got {text[:60]!r}"
         )
-    number, rest = float(found[1]), found[2].strip()
+    number = float(found[1])
+    rest = found[2].strip()
     if math.isinf(number):
         raise InputError(
             f"{name} = {text[:60]!r} is above the largest number of 64 bits, 1.8e308"
@@ -363,7 +364,8 @@ def unit_of(name: str, units: Units) -> str:
 
 def force_over_area(force: Any, area: Any, length: str | None) -> str:
     """The pressure of a force such as "40 kN", plain numbers in N, on an area [length^2], as a text with its unit."""
-    number, unit = force, "N"
+    number = force
+    unit = "N"
     if isinstance(force, str):
         match = _NUMBER.fullmatch(force)
         if match is None:

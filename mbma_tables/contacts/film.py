@@ -30,7 +30,11 @@ RANGE = (0.2, 50.0)  # u/h_rms
 # simulated: A/A0 of the lightest contact, knots of curves in contact and before it, the
 # first gap before it over the highest point, and standard deviations of ln phi before
 # contact and of ln phi_s, of the grid and between the knots
-LIGHTEST, KNOTS, CLEAR, OWN, OWN_SHEAR = 0.002, 7, 1.001, 0.01, 0.02
+LIGHTEST = 0.002
+KNOTS = 7
+CLEAR = 1.001
+OWN = 0.01
+OWN_SHEAR = 0.02
 USEFUL = 0.5  # standard deviation of ln phi above which a flow factor is not valid
 
 
@@ -181,7 +185,8 @@ def flow_factors(
     found = contact(surface, bodies, mean_separation=mean_separation, theory=theory)
     if surface.labelled or surface.shape != ():
         raise InputError("flow factors need one surface, not a batch")
-    u, h_rms = np.ravel(found.mean_separation), float(surface.h_rms)
+    u = np.ravel(found.mean_separation)
+    h_rms = float(surface.h_rms)
     # a surface opened from the table of its simulation has no map for gaps before contact
     own = found.theory in OF_MAPS and getattr(surface, "map", None) is not None
     low, high = RANGE
@@ -196,14 +201,16 @@ def flow_factors(
         if peklenik is None
         else number_in("peklenik", peklenik, 1 / WIDEST_LAY, WIDEST_LAY)
     )
-    area, leak = np.ravel(found.area), found.leakage
+    area = np.ravel(found.area)
+    leak = found.leakage
     if own:
         if peklenik is not None:
             raise InputError(
                 "peklenik is not of a map that is simulated: leave it out, or give theory='calibrated'"
             )
         (phi_x, phi_y), shear = _simulated(found, u)
-        of_lay, far = 0.0, False
+        of_lay = 0.0
+        far = False
     else:
         ratio, shear = factors(u / h_rms, area, gamma, shipped_flow().constants)
         phi_x, phi_y = np.ravel(leak.K) / u**3 * ratio
@@ -225,14 +232,10 @@ def flow_factors(
     units = {name: found.units[name] for name in ("mean_separation", "pressure")}
     units |= dict.fromkeys(("K_x", "K_y"), unit_of("leakage", found.unit_system))
     kept = {text: mask for text, mask in reasons.items() if np.any(mask)}
-    shear_scatter, valid = (
-        np.full(u.shape, OWN_SHEAR if own else SHEAR),
-        ~np.logical_or.reduce(list(reasons.values())),
-    )
-    flows, asperities = (
-        (u, phi_x, phi_y, shear[0], shear[1]),
-        (np.ravel(found.pressure), area),
-    )
+    shear_scatter = np.full(u.shape, OWN_SHEAR if own else SHEAR)
+    valid = ~np.logical_or.reduce(list(reasons.values()))
+    flows = (u, phi_x, phi_y, shear[0], shear[1])
+    asperities = (np.ravel(found.pressure), area)
     # the lightest contacts count here: their pressure depends on the highest points alone
     of_pressure = np.ravel(found.scatter), np.ravel(found.valid)
     uncertain = scatter, shear_scatter, valid, *of_pressure
@@ -244,8 +247,10 @@ def flow_factors(
 def _simulated(found: Any, u: FloatArray) -> tuple[FloatArray, FloatArray]:
     """phi and phi_s along both axes, shape (2, n), of the gaps of a map: simulated ones, and wider ones undeformed."""
     surface: Any = found.surface
-    whole, theory = map_of(surface), found.elastic_theory
-    h_rms, heights = float(surface.h_rms), whole.heights - whole.heights.mean()
+    whole = map_of(surface)
+    theory = found.elastic_theory
+    h_rms = float(surface.h_rms)
+    heights = whole.heights - whole.heights.mean()
 
     def flow(gap: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         cell = gap if whole.periodic else mirrored(gap)
@@ -268,10 +273,9 @@ def _simulated(found: Any, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         for known in np.geomspace(top * CLEAR, max(u.max(), 2 * top), KNOTS)
     ]
     at, phi, shear = (np.array(part) for part in zip(*rows, strict=True))
-    leak, wide = (
-        found.leakage,
-        slice(knots.size, None),
-    )  # at their own knots, whose flow is far from blocked
+    # at their own knots, whose flow is far from blocked
+    leak = found.leakage
+    wide = slice(knots.size, None)
     curve = PchipInterpolator(np.log(at[wide]), np.log(phi[wide]))
     beyond = np.exp(curve(np.log(np.maximum(u, at[knots.size])))).T
     own = np.where(

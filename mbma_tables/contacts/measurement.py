@@ -27,12 +27,11 @@ GAPS = np.append(
 def described(surface: MeasuredSurface) -> list[str]:
     """Text lines on a measurement: its properties, its treatment, and consequences for theories."""
     unit = surface.unit or "length"
-    h_rms, shortest, longest = (
-        float(surface.h_rms),
-        2 * np.pi / float(surface.q1),
-        2 * np.pi / float(surface.q0),
-    )
-    top, gradient = float(surface.h_max), float(surface.rms_gradient)
+    h_rms = float(surface.h_rms)
+    shortest = 2 * np.pi / float(surface.q1)
+    longest = 2 * np.pi / float(surface.q0)
+    top = float(surface.h_max)
+    gradient = float(surface.rms_gradient)
     lines = [
         f"h_rms {h_rms:.4g} {unit}, highest point {top:.4g} {unit} ({top / h_rms:.3g} h_rms), rms gradient"
     ]
@@ -126,7 +125,8 @@ def draw(
     `answers` are those of `curves`; `simulated` has force, area and mean_separation of
     boundary elements, as points.
     """
-    figure, unit = new_figure(12, 7.5), surface.unit or "length"
+    figure = new_figure(12, 7.5)
+    unit = surface.unit or "length"
     parts: Any = figure.subfigures(2, 1)
     above, below = parts
     heights, *form, spectrum, distribution = above.subplots(
@@ -215,7 +215,8 @@ def _spectrum(axes: Any, surface: MeasuredSurface, unit: str) -> None:
 
 def _distribution(axes: Any, surface: MeasuredSurface) -> None:
     # density of heights from their quantiles, smoothed over a few
-    heights, h_rms = np.asarray(surface.heights.quantiles), float(surface.h_rms)
+    heights = np.asarray(surface.heights.quantiles)
+    h_rms = float(surface.h_rms)
     grid = np.linspace(-4.5, 4.5, 61)
     below = np.interp(grid * h_rms, heights[::-1], 1 - np.asarray(SHARES)[::-1])
     axes.stairs(
@@ -233,7 +234,9 @@ def _by_pressure(
     axes: Any, answers: Mapping[str, Any], simulated: Any, what: str, scatter: str
 ) -> None:
     for name, found in answers.items():
-        pressure, value, width = found["pressure"], found[what], found[scatter]
+        pressure = found["pressure"]
+        value = found[what]
+        width = found[scatter]
         # MBMA's sum of island areas may exceed 1
         held = (
             np.isfinite(pressure)
@@ -242,7 +245,8 @@ def _by_pressure(
             & (pressure > 0)
         )
         (line,) = axes.plot(pressure[held], value[held], label=theory_label(name))
-        band, times = held & np.isfinite(width), np.exp(width)
+        band = held & np.isfinite(width)
+        times = np.exp(width)
         low, high = (
             (value / times, value * times)
             if what == "area"
@@ -272,16 +276,15 @@ def table_of_loads(
     def contacts(some: FloatArray) -> str:
         return f"contact of {', '.join(f'{area:g}' for area in some)}"
 
-    areas, told = AREAS, []
+    areas = AREAS
+    told = []
     try:
         found = contact(surface, E_star, area=areas, theory=theory)
     except OutOfRangeError as fault:
         if fault.mask is None or np.all(fault.mask):
             raise
-        areas, told = (
-            AREAS[~fault.mask],
-            [f"{contacts(AREAS[fault.mask])} left out: {fault}"],
-        )
+        areas = AREAS[~fault.mask]
+        told = [f"{contacts(AREAS[fault.mask])} left out: {fault}"]
         found = contact(surface, E_star, area=areas, theory=theory)
     # curves of unusual maps skip some contact areas
     reached = np.abs(np.asarray(found.area) / areas - 1) < REACHED
@@ -300,10 +303,8 @@ def table_of_loads(
     columns: dict[str, Any] = {
         name: np.asarray(getattr(found, name))[reached] for name in names
     }
-    reasons, everywhere = (
-        found.reasons,
-        chosen_theory(surface, theory, "area").departures(surface),
-    )
+    reasons = found.reasons
+    everywhere = chosen_theory(surface, theory, "area").departures(surface)
     told += [
         f"not valid at {contacts(areas[m])}: {text}"
         for text, m in reasons.items()

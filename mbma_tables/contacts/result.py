@@ -539,10 +539,8 @@ class ContactMap(Displayed):
 
     def _figure(self) -> Any:
         figure = new_figure(10, 4.2)
-        length, stress = (
-            {"1": "length"}.get(self.units["gap"], self.units["gap"]),
-            self.units["pressure"],
-        )
+        length = {"1": "length"}.get(self.units["gap"], self.units["gap"])
+        stress = self.units["pressure"]
         sides = [
             count * step
             for count, step in zip(self.pressure.shape, self.steps, strict=True)

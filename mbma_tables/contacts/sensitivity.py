@@ -195,7 +195,8 @@ class OfOneMap(Unknowns):
         theory: Theory,
     ) -> dict[str, Any]:
         """`ANSWERS` of the map with these factors."""
-        heights, lengths = numbers["heights"], numbers["lengths"]
+        heights = numbers["heights"]
+        lengths = numbers["lengths"]
         equal_modulus = modulus * heights / lengths
         scale = {"pressure": equal_modulus, "area": 1.0}.get(by, heights)
         pressed: Any = contact(self.make(), **{by: value / scale}, theory=theory)
@@ -384,7 +385,8 @@ def _of_drawing(surface: Any, unit: str | None) -> Unknowns | None:
         return None
     names = PARAMETERS if isinstance(surface, Surface) else ("q", "C", "h_max")
     for name in names:
-        before, now = getattr(drawn, name), getattr(surface, name)
+        before = getattr(drawn, name)
+        now = getattr(surface, name)
         if np.shape(before) != np.shape(now) or not np.allclose(
             before, now, rtol=1e-9, atol=0
         ):

@@ -107,7 +107,8 @@ def source_texts(model: UniversalModel, variant: Variant) -> dict[str, str]:
 
 def model_texts(heads: dict[str, str]) -> dict[str, str]:
     """The calls of one surface, under the opening comments of their files."""
-    form, certificates = RANGES[FORM], CERTIFICATES[FORM]
+    form = RANGES[FORM]
+    certificates = CERTIFICATES[FORM]
     prototypes, forms = closed_forms()
     parts = {
         "PROTOTYPES": prototypes,
@@ -133,7 +134,8 @@ def model_texts(heads: dict[str, str]) -> dict[str, str]:
 
 def closed_forms() -> tuple[str, str]:
     """Prototypes and definitions of the closed forms."""
-    prototypes, lines = "", list[str]()
+    prototypes = ""
+    lines = list[str]()
     for one in (one for results in FUNCTIONS.values() for one in results.values()):
         head = f"double mbma_{one.form}_{one.result}({', '.join(f'double {name}' for name in one.arguments)})"
         prototypes += f"{head};\n"
@@ -163,26 +165,23 @@ def tables(model: UniversalModel) -> dict[str, Any]:
 
 def data_text(model: UniversalModel, variant: Variant, later: bool = False) -> str:
     """The tables, and the variant of the equations; with `later` as variables, for a program to fill in."""
-    lines, law = ['#include "mbma_model.h"'], calibrated_table.shipped()
+    lines = ['#include "mbma_model.h"']
+    law = calibrated_table.shipped()
     for (name, values), kind in zip(
         tables(model).items(), ("mbma_cell", "int32_t", "float"), strict=True
     ):
-        head, body = (
-            f"{kind} {name}[{len(values)}]",
-            _cells
-            if kind == "mbma_cell"
-            else lambda numbers: _wrapped(numerals(numbers)),
+        head = f"{kind} {name}[{len(values)}]"
+        body = (
+            _cells if kind == "mbma_cell" else lambda numbers: _wrapped(numerals(numbers))
         )
         lines += (
             ["", f"{head};"]
             if later
             else ["", f"static const {head} = {{", *body(values), "};"]
         )
-    X, buckets, flags = (
-        model.cells[2][:4],
-        model.cells[2][4:].astype(int),
-        variant.numbers[5:].astype(int),
-    )
+    X = model.cells[2][:4]
+    buckets = model.cells[2][4:].astype(int)
+    flags = variant.numbers[5:].astype(int)
     spline = (
         "MBMA_SPLINE",
         law.cells,
@@ -242,13 +241,15 @@ def _cells(cells: FloatArray) -> Iterator[str]:
 
 def header(name: str, model: UniversalModel, variant: Variant) -> list[str]:
     """Paragraphs of a file's opening comment: origin, contents, variant, range, errors, conventions, licence."""
-    content, law = model.content, calibrated_table.shipped()
+    content = model.content
+    law = calibrated_table.shipped()
     found, (X, mu) = content.attributes, content.axes
     worst, visited = (
         max(float(found[f"{which}largest_error_{of}"]) for of in ("F", "A"))
         for which in ("", "visited_")
     )
-    form, certificates = RANGES[FORM], CERTIFICATES[FORM]
+    form = RANGES[FORM]
+    certificates = CERTIFICATES[FORM]
     ranges = [
         f"{axis} in [{about(math.exp(low) if k else low)}, {about(math.exp(high) if k else high)}]"
         for k, (axis, (low, high)) in enumerate(
@@ -298,7 +299,8 @@ def write_code(
     ...     [path.name for path in write_code(folder) if path.name.startswith("mbma_")]
     ['mbma_model.h', 'mbma_model.c', 'mbma_data.c', 'mbma_selftest.c', 'mbma_conformance.csv']
     """
-    rule, model = get_variant(variant), universal_model()
+    rule = get_variant(variant)
+    model = universal_model()
     texts = source_texts(model, rule) | {POINTS_FILE: points_text(model, rule)}
     for name, text in texts.items():
         write_file(pathlib.Path(folder, name), text.encode(), make_folders=True)

@@ -35,7 +35,12 @@ KINDS = {
 }
 TOLERANCE = 1e-11
 ANY = 1e300  # what the difference of a number that may be any is relative to
-OK, X_BELOW, X_ABOVE, MU_ABOVE, INVALID = 0, 1, 2, 3, 5  # of mbma.h
+# of mbma.h
+OK = 0
+X_BELOW = 1
+X_ABOVE = 2
+MU_ABOVE = 3
+INVALID = 5
 SURFACES = (
     # hurst, q0, q1, h_rms, h_max
     (0.8, 1.0, 1e2, 1.0, 3.5),
@@ -91,22 +96,22 @@ def surface_rows(
     E_star: float = 1.0,
 ) -> Rows:
     """Islands and totals of one surface, gap by gap, and the calibrated law at shares of h_max, by the library."""
-    own, model = Surface(*surface), universal_model()
+    own = Surface(*surface)
+    model = universal_model()
     fields = geometry(approach, own.hurst, own.zeta_1, variant)
     yield from rows(
         "geometry", (approach, own.hurst, own.zeta_1), [fields[name] for name in FIELDS]
     )
     gaps = own.h_max * (1 - np.asarray(depths))
-    sums, compression = np.zeros((5, gaps.size)), (own.h_max - gaps) / own.h_rms
+    sums = np.zeros((5, gaps.size))
+    compression = (own.h_max - gaps) / own.h_rms
     by_table(
         own, compression, np.arange(gaps.size), model, Sums(model, variant, RTOL), sums
     )
     stress = own.q0 * own.s
-    pressure, area, stiffness = (
-        stress * sums[0],
-        sums[1],
-        2 * stress / own.h_rms * sums[2],
-    )
+    pressure = stress * sums[0]
+    area = sums[1]
+    stiffness = 2 * stress / own.h_rms * sums[2]
     # at a maximum of force, stiffness is 0
     least = np.maximum(
         np.abs(stiffness), np.where(pressure == 0, 1.0, pressure) / own.h_max

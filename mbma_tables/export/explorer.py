@@ -45,13 +45,16 @@ SCRIPTS = (
     "main.js",
 )
 MAP_NOTE = "By the map's spectrum and h_max alone: in Python the calibrated law goes by its heights, too, and is nearer."
-K_S, NU = 50.0, 0.3  # first conductivity [W/(m K)] and Poisson's ratio
+# first conductivity [W/(m K)] and Poisson's ratio
+K_S = 50.0
+NU = 0.3
 MAX_SAMPLES = 500  # samples of a spectrum, so that a step of a slider stays fast
 
 
 def packed(values: Any) -> dict[str, Any]:
     """Numbers as text: their bytes by planes, deflated; bits of single precision differenced twice before."""
-    flat, differences = np.ravel(values), 2 * (values.dtype == np.float32)
+    flat = np.ravel(values)
+    differences = 2 * (values.dtype == np.float32)
     for _ in range(differences):
         flat = np.diff(flat.view(np.int32), prepend=np.int32(0))
     planes = np.ascontiguousarray(flat.view(np.uint8).reshape(flat.size, -1).T)

@@ -36,14 +36,12 @@ from mbma_tables.theories.mbma.variants import Variant
 
 LAW_RTOL = 1e-8
 LOOKED_AT = 200  # compressions at which validity and scatter are looked at
-SMALL, NEAREST = (
-    20,
-    1e-5,
-)  # smaller ones for validity alone, down to this share of the largest
-ROUNDS, PARTS = (
-    4,
-    32,
-)  # rounds and parts of the search for an end of validity between two of them
+# smaller ones for validity alone, down to this share of the largest
+SMALL = 20
+NEAREST = 1e-5
+# rounds and parts of the search for an end of validity between two of them
+ROUNDS = 4
+PARTS = 32
 KAPPA = 0.5, 2.0  # range of normal over tangential stiffness
 GAS_AT = 5  # pressures at which a header has the conductance of the gas alone
 OWN_NUMBERS = (
@@ -174,10 +172,8 @@ class ExportedLaw:
                 "conductance is that of the solid spots alone, without gas in the gaps",
             )
         u = self.law.h_max - end * np.linspace(0, 1, GAS_AT)
-        values, pressures = (
-            gas.conductance(self.answer(u)),
-            np.asarray(self.law.pressure(u)),
-        )
+        values = gas.conductance(self.answer(u))
+        pressures = np.asarray(self.law.pressure(u))
         alone = ", ".join(
             f"{about(value)} at {about(pressure, 3)}"
             for value, pressure in zip(values, pressures, strict=True)
@@ -194,7 +190,8 @@ class ExportedLaw:
         self, what: str, range_: str, *more: str, end: float, leakage: bool = False
     ) -> tuple[str, ...]:
         """Lines of a file's header: contents, range, error, validity up to `end`, and with `leakage` those of flow."""
-        law, stress = self.law, self.stress
+        law = self.law
+        stress = self.stress
         title = (
             f"MBMA model, variant {law.variant!r}"
             if law.theory == Mbma.name
@@ -207,7 +204,8 @@ class ExportedLaw:
             "c = 0 is first contact: bodies meet where their mean planes are h_max apart",
         )
         if self.force is not None:
-            body, stress = self.force.body, self.force.body.units["pressure"]
+            body = self.force.body
+            stress = self.force.body.units["pressure"]
             title = f"Force law of a rough {body.name} on a flat, theory {law.theory!r}"
             meaning = (
                 f"here pressure is the force [{self.stress}], and A/A0 the real area [{body.units['area']}]",
@@ -244,11 +242,13 @@ class ExportedLaw:
 
     def _validity(self, end: float, leakage: bool) -> Iterator[str]:
         """Lines on the valid range of the law, and its scatter against simulations."""
-        law, unit = self.law, self.stress
+        law = self.law
+        unit = self.stress
         # small overclosures by their logarithm, larger ones evenly
         small = np.geomspace(NEAREST, 1 / LOOKED_AT, SMALL, endpoint=False)
         u = law.h_max - end * np.append(small, np.linspace(0, 1, LOOKED_AT + 1)[1:])
-        found, pressure = self.answer(u), np.asarray(law.pressure(u))
+        found = self.answer(u)
+        pressure = np.asarray(law.pressure(u))
         for reason, bad in (found.leakage if leakage else found).reasons.items():
             for first, last in np.flatnonzero(
                 np.diff(bad, prepend=False, append=False)
@@ -295,7 +295,8 @@ class ExportedLaw:
                 reason, np.zeros(PARTS - 1, bool)
             )
             k = 1 + int(np.argmax(np.append(mask, True)))
-            good, bad = u[k - 1], u[k]
+            good = u[k - 1]
+            bad = u[k]
         four_digits = Context(prec=4, rounding=rounding)
         return about(four_digits.create_decimal(float(self.law.pressure(good))))
 
@@ -313,7 +314,8 @@ class ExportedLaw:
 
     def _spread(self, what: str, scatter: Numbers, pressure: FloatArray) -> str:
         """A scatter at five pressures where it is known."""
-        sizes, pressure = np.asarray(scatter)[SMALL:], pressure[SMALL:]
+        sizes = np.asarray(scatter)[SMALL:]
+        pressure = pressure[SMALL:]
         known = np.flatnonzero(np.isfinite(sizes))
         places = (
             known[np.linspace(0, known.size - 1, 5).astype(int)] if known.size else known
@@ -325,7 +327,8 @@ class ExportedLaw:
 
     def _of_leakage(self, scatter: str) -> Iterator[str]:
         """Lines on leakage."""
-        blocked, stress = self.leakage.blocked_at, self.stress
+        blocked = self.leakage.blocked_at
+        stress = self.stress
         way = (
             ""
             if self.law.gaps is None
@@ -337,7 +340,8 @@ class ExportedLaw:
             f"{about(1e-3 * factor('Pa', stress, 'stress'))} {stress} s"
         )
         if blocked > -np.inf:
-            load, c = float(self.law.pressure(blocked)), self.law.h_max - blocked
+            load = float(self.law.pressure(blocked))
+            c = self.law.h_max - blocked
             where = f"from p = {number(load)} {stress}, c = {number(c)} on"
             if np.isnan(self.leakage(blocked)):
                 yield f"K = 0 stands for not known {where}: the elastic contact blocks there, and a yielded one leaks"
@@ -371,7 +375,8 @@ def exported_law(
             raise InputError(
                 "a force law has its modulus, hardness, units and theory: give no others"
             )
-        body, layer = surface.body, surface.body.law
+        body = surface.body
+        layer = surface.body.law
         length, _ = _known(body.surface.unit, layer.units.stress)
         numbers = layer.E_star, layer.hardness, length, body.units["force"], made_by
         return ExportedLaw(

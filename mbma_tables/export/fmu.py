@@ -80,7 +80,8 @@ def fmu(
         name, MAX_NAME, windows_words(), "Windows, where its files are named so,"
     )
     found = asked_law(surface, E_star, name, **asked)
-    law, exported = text_of("c-law", found), found.exported
+    law = text_of("c-law", found)
+    exported = found.exported
     variables = _variables(found)
     token = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, law)}}}"
     parts = {
@@ -124,10 +125,8 @@ def _binaries(name: str, source: str, asked: str) -> dict[str, bytes]:
         raise InputError(
             f"binaries must be one of {('here', 'all', 'none')}, got {asked!r}"
         )
-    zig, system = (
-        importlib.util.find_spec("ziglang"),
-        f"{platform.machine()} {sys.platform}".lower(),
-    )
+    zig = importlib.util.find_spec("ziglang")
+    system = f"{platform.machine()} {sys.platform}".lower()
     if asked == "all" and zig is None:
         raise InputError(
             "binaries for all platforms are compiled by ziglang: pip install ziglang"
@@ -166,7 +165,8 @@ def _binaries(name: str, source: str, asked: str) -> dict[str, bytes]:
 def _variables(found: AskedLaw) -> list[dict[str, str]]:
     """XML attributes of each variable, by value reference."""
     exported = found.exported
-    length, stress = exported.length, exported.stress
+    length = exported.length
+    stress = exported.stress
     asked = {
         "start": number(0.0 if exported.ends else max(0.0, exported.c_least)),
         "max": number(exported.c_most),
@@ -204,7 +204,8 @@ def _description(
     exported: ExportedLaw,
 ) -> bytes:
     """modelDescription.xml."""
-    length, stress = exported.length, exported.stress
+    length = exported.length
+    stress = exported.stress
     facts = {"fmiVersion": "2.0", "modelName": name, "guid": token, "description": text}
     facts |= {
         "generationTool": f"mbma_tables {__version__}",
@@ -221,7 +222,8 @@ def _description(
             ET.SubElement(interface, "SourceFiles"), "File", {"name": f"{name}.c"}
         )
     # by units of SI
-    metre, pascal = factor(length, "m"), factor(stress, "Pa", "stress")
+    metre = factor(length, "m")
+    pascal = factor(stress, "Pa", "stress")
     bases: dict[str, tuple[dict[str, int], float]] = {
         "s": ({"s": 1}, 1.0),
         "1": ({}, 1.0),
@@ -243,10 +245,8 @@ def _description(
     categories = ET.SubElement(root, "LogCategories")
     for category in ("logStatusDiscard", "logStatusError"):
         ET.SubElement(categories, "Category", {"name": category})
-    listed, structure = (
-        ET.SubElement(root, "ModelVariables"),
-        ET.SubElement(root, "ModelStructure"),
-    )
+    listed = ET.SubElement(root, "ModelVariables")
+    structure = ET.SubElement(root, "ModelStructure")
     of_real = ("unit", "start", "min", "max")
     for reference, all_of in enumerate(variables):
         outer = {"valueReference": str(reference), "variability": "continuous"}

@@ -38,8 +38,12 @@ OF_FRICTION = 5  # pressures at which a friction card's comments have the stiffn
 # of the largest value, where no range is given: below it, errors are relative to this, not
 # to the value
 FLOOR = 1e-3
-FINE, LAST = 20_001, 2_001  # points at which the error of a choice of rows is measured
-LAST_SHARE, NEAREST_END = 1e-2, 1e-9  # mean separations of the last points, over h_max
+# points at which the error of a choice of rows is measured
+FINE = 20_001
+LAST = 2_001
+# mean separations of the last points, over h_max
+LAST_SHARE = 1e-2
+NEAREST_END = 1e-9
 FILM_ROWS = 200
 FILM_RANGE = (0.2 * (1 + 1e-9), 10.0)  # u/h_rms
 NEAREST_GAP = 1e-9  # smallest overclosure of a film evaluated, over h_max
@@ -143,11 +147,9 @@ def describe_law(
     """
     if quantity not in AGAINST:
         raise InputError(f"quantity must be one of {tuple(AGAINST)}, got {quantity!r}")
-    of_body, heat, film = (
-        isinstance(surface, ForceLaw),
-        quantity == "conductance",
-        quantity == "film",
-    )
+    of_body = isinstance(surface, ForceLaw)
+    heat = quantity == "conductance"
+    film = quantity == "film"
     for given, needs, names in (
         (of_body, quantity == "pressure", "a force law"),
         (peklenik is not None, film, "peklenik"),
@@ -178,7 +180,10 @@ def describe_law(
         )
         return _film_rows(exported, count, least, end if pressures else np.inf, peklenik)
     choose = functools.partial(chosen_rows, rows=rows, rtol=rtol, evenly=evenly)
-    scale, unit, facts, behaviour = 1.0, exported.stress, exported.facts, None
+    scale = 1.0
+    unit = exported.stress
+    facts = exported.facts
+    behaviour = None
     said: list[str] = []
     if heat:
         behaviour = _table(exported, "pressure", unit, least, end, choose, 1.0, facts)
@@ -234,10 +239,8 @@ def _curve(
     u = law.h_max * np.geomspace(max(1 - end / law.h_max, NEAREST_END), LAST_SHARE, LAST)
     c = np.union1d(c, law.h_max - u[1:-1]) if u[0] < u[-1] else c
     d = law.h_max - 2 * c
-    pressure, stiffness = (
-        np.asarray(law.pressure(separation=d)),
-        np.asarray(law.stiffness(separation=d)),
-    )
+    pressure = np.asarray(law.pressure(separation=d))
+    stiffness = np.asarray(law.stiffness(separation=d))
     pressure[0] = stiffness[0] = 0.0
     if quantity == "pressure":
         return c, pressure
@@ -265,7 +268,8 @@ def _friction(
     pressures: tuple[Any, Any] | None,
 ) -> tuple[dict[str, tuple[float, str]], str]:
     """Facts for friction cards, by the stiffness of a small unloading, and what these mean."""
-    law, units = exported.law, exported.law.units
+    law = exported.law
+    units = exported.law.units
     if kappa is None or (pressure is None and pressures is None):
         raise InputError(
             "friction needs kappa, normal over tangential stiffness, and friction_pressure or pressures"
@@ -287,7 +291,8 @@ def _friction(
     def stiffness(p: float) -> float:
         return float(law.unloading_stiffness(law.at_pressure(p).mean_separation)) / ratio
 
-    stick, unit = stiffness(at), f"{exported.stress}/{exported.length}"
+    stick = stiffness(at)
+    unit = f"{exported.stress}/{exported.length}"
     places = dict.fromkeys(np.geomspace(ends[0], ends[1], OF_FRICTION).tolist())
     listed = [f"{about(stiffness(p))} at {about(p)}" for p in places]
     facts = {"friction": (number_in("friction", friction, 1e-12, 1e12), "1")}
@@ -313,7 +318,9 @@ def _table(
     kappa: Callable[[Any], Any] | None = None,
 ) -> LawTable:
     """Rows up to an overclosure, whose error bound applies above the pressure `least`, or above `FLOOR`."""
-    law, length, stress = exported.law, exported.length, exported.stress
+    law = exported.law
+    length = exported.length
+    stress = exported.stress
     fine_x, fine_y = _curve(exported, quantity, end, scale, gas)
     x_name, x_unit = (
         ("overclosure", length) if quantity == "pressure" else ("pressure", stress)
@@ -336,7 +343,8 @@ def _table(
     if slope := quantity in ("conductance", "tangential_stiffness"):
         # below the smallest pressure of interest there is only the row of zero pressure
         used = np.append(True, fine_y[1:] > floor * (1 - 1e-9))
-        fine_x, fine_y = fine_x[used], fine_y[used]
+        fine_x = fine_x[used]
+        fine_y = fine_y[used]
     if kappa is not None:
         # of a surface with a lay it depends on the contact area, and is known for some of them
         fine_y[1:] /= np.asarray(kappa(np.asarray(law.at_pressure(fine_x[1:]).area)))
@@ -400,8 +408,10 @@ def _of_aperture(
 ) -> tuple[dict[str, tuple[FloatArray, str]], list[str]]:
     """Columns beside the hydraulic aperture, at pressures x, and the lines of a header on their rows."""
     law = exported.law
-    at_rows, at_fine = law.at_pressure(x), law.at_pressure(fine_x)
-    u, fine_u = np.asarray(at_rows.mean_separation), np.asarray(at_fine.mean_separation)
+    at_rows = law.at_pressure(x)
+    at_fine = law.at_pressure(fine_x)
+    u = np.asarray(at_rows.mean_separation)
+    fine_u = np.asarray(at_fine.mean_separation)
     fine_derivative = np.gradient(fine_y, fine_u)
     by_u = np.interp(-u, -fine_u, fine_derivative)
     columns = {
@@ -434,7 +444,8 @@ def _range(
     exported: ExportedLaw, pressures: tuple[float | str, float | str] | None
 ) -> tuple[float | None, float]:
     """Smallest pressure for the error, and largest overclosure, from a range of pressures."""
-    law, units = exported.law, exported.law.units
+    law = exported.law
+    units = exported.law.units
     if pressures is None:
         return None, exported.c_turn
     two = isinstance(pressures, tuple | list | np.ndarray) and len(pressures) == 2
@@ -462,12 +473,10 @@ def _film_rows(
     peklenik: float | None,
 ) -> LawTable:
     """Flow factors and asperity pressure at mean gaps whose ratios are equal."""
-    h_rms, h_max, length, stress = (
-        float(exported.surface.h_rms),
-        exported.law.h_max,
-        exported.length,
-        exported.stress,
-    )
+    h_rms = float(exported.surface.h_rms)
+    h_max = exported.law.h_max
+    length = exported.length
+    stress = exported.stress
     u = rounded(
         np.geomspace(max(FILM_RANGE[0] * h_rms, h_max - end), FILM_RANGE[1] * h_rms, rows)
     )
@@ -478,12 +487,14 @@ def _film_rows(
         peklenik=peklenik,
         theory=exported.theory,
     )
-    found, middle = at(u), at((u[1:] + u[:-1]) / 2)
+    found = at(u)
+    middle = at((u[1:] + u[:-1]) / 2)
     tested = found.pressure[found.area >= TESTED_AREA[0]]
     floor = least if least is not None else float(tested.min()) if tested.size else np.inf
     errors = {}  # largest of linear interpolation, in the middle of the intervals
     for name in FILM_NAMES:
-        value, between = getattr(found, name), getattr(middle, name)
+        value = getattr(found, name)
+        between = getattr(middle, name)
         kept = middle.valid & (between > (floor if name == "pressure" else 0))
         off = (value[1:] + value[:-1])[kept] / (2 * between[kept]) - 1
         errors[name] = float(np.abs(off).max(initial=0.0))
@@ -513,7 +524,8 @@ def _film_rows(
     )
     facts = exported.facts | {"peklenik": (found.peklenik, "1")}
     y, unit = columns.pop("phi_x")
-    names, theory = ("mean_separation", "phi_x"), exported.law.theory
+    names = ("mean_separation", "phi_x")
+    theory = exported.law.theory
     return LawTable(
         u, y, *names, length, unit, error, comments, theory, floor, None, columns, facts
     )

@@ -24,7 +24,8 @@ from mbma_tables.common.plots import draw_line
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MIN_ROWS, MAX_ROWS = 3, 5000
+MIN_ROWS = 3
+MAX_ROWS = 5000
 DIGITS = 10  # of rows, which are shorter to read; files hold exactly these
 ROUNDS = 40  # rounds of making the errors of chords equal
 LAST = 1.5  # the last chord's error counts so much more, as its last row is not moved
@@ -112,7 +113,8 @@ def chosen_rows(
     # with a jump the first two fine points are rows
     begin = fine_x[:1], fine_y[:1]
     if jump:
-        fine_x, fine_y = fine_x[1:], fine_y[1:]
+        fine_x = fine_x[1:]
+        fine_y = fine_y[1:]
     if rows is not None and rtol is not None:
         raise InputError("rows and rtol are both given: give one of them")
 
@@ -193,7 +195,8 @@ def spread(x: FloatArray, y: FloatArray, count: int, floor: float) -> FloatArray
         [[0.0], np.cumsum(np.abs(np.diff(y)) / scale[1:])]
     ) + np.linspace(0, 3, x.size)
     places = cut(filled, x)
-    best, found = np.inf, places
+    best = np.inf
+    found = places
     for _ in range(ROUNDS):
         chords = np.interp(places, x, y)
         step = np.clip(np.searchsorted(places, x, side="right") - 1, 0, count - 2)
@@ -201,7 +204,8 @@ def spread(x: FloatArray, y: FloatArray, count: int, floor: float) -> FloatArray
         np.maximum.at(error, step, np.abs(np.interp(x, places, chords) - y) / scale)
         error[-1] *= LAST
         if error.max() < best:
-            best, found = error.max(), places
+            best = error.max()
+            found = places
         # the error of a chord falls like the square of its length
         root = np.sqrt(error + 1e-3 * error.max())
         places = cut(np.concatenate([[0.0], np.cumsum(root)]), places)
@@ -215,7 +219,8 @@ def balanced(
     scale = np.maximum(fine_y, floor)
     over = (np.interp(fine_x, x, y) - fine_y) / scale
     step = np.clip(np.searchsorted(x, fine_x, side="right") - 1, 0, x.size - 2)
-    high, low = np.zeros(x.size - 1), np.zeros(x.size - 1)
+    high = np.zeros(x.size - 1)
+    low = np.zeros(x.size - 1)
     np.maximum.at(high, step, over)
     np.minimum.at(low, step, over)
     middle = (high + low) / 2

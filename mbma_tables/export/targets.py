@@ -142,10 +142,8 @@ class Grammar:
 
     def _check(self, law: LawTable) -> None:
         """Refuse a law that the program does not take."""
-        own, most = (
-            tuple(law.facts[fact][1] for fact in ("h_rms", "E_star")),
-            self.most.get(law.y_name, law.x.size),
-        )
+        own = tuple(law.facts[fact][1] for fact in ("h_rms", "E_star"))
+        most = self.most.get(law.y_name, law.x.size)
         taken = " or ".join(f"{y} against {AGAINST[y]}" for y in self.body)
         for allowed, takes, got in (
             (law.quantity in self.body, taken, f"{law.y_name} against {law.x_name}"),

@@ -13,13 +13,12 @@ from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.core import core
 
 DEGREE = 8
-CENTRE, RATE, FORCE_AT, AREA_AT, ENERGY_AT = (
-    0,
-    1,
-    2,
-    3 + DEGREE,
-    4 + 2 * DEGREE,
-)  # in a record
+# in a record
+CENTRE = 0
+RATE = 1
+FORCE_AT = 2
+AREA_AT = 3 + DEGREE
+ENERGY_AT = 4 + 2 * DEGREE
 RECORD = 5 + 2 * DEGREE
 # names of the quantities
 QUANTITIES = ("pressure", "area", "stiffness", "area_slope", "energy")
@@ -59,14 +58,14 @@ FIRST_BUCKETS = {
     -3: 4,
 }  # initial buckets of the octaves below x = 1, with curved Gaussians; 2 below
 SLOPES = 100.0  # ratio of the tolerance of slopes (over F/x if that is larger) to that of values
-COARSE, COARSE_SLOPES = (
-    1e-7,
-    10.0,
-)  # tolerance above which octaves begin with one bucket; and that of slopes there
+# tolerance above which octaves begin with one bucket; and that of slopes there
+COARSE = 1e-7
+COARSE_SLOPES = 10.0
 FOR_SLOPES = 4  # largest factor of additional buckets for slopes
 KEPT = DEGREE + 1
 
-_POINTS, _DEGREES = chebyshev.chebpts1(SAMPLES), np.arange(SAMPLES)
+_POINTS = chebyshev.chebpts1(SAMPLES)
+_DEGREES = np.arange(SAMPLES)
 PLACES = (
     np.stack([1 - _POINTS, 1 + _POINTS]) / 2
 )  # from an interval's ends to samples, and from values there to a
@@ -87,7 +86,9 @@ MONOMIALS, FROM_ZERO = np.zeros((2, KEPT, KEPT))
 for _k in range(KEPT):
     MONOMIALS[_k, : _k + 1] = chebyshev.cheb2poly(np.eye(KEPT)[_k, : _k + 1])
     FROM_ZERO[_k] = [math.comb(_k, j) * 2.0**j * (-1.0) ** (_k - j) for j in range(KEPT)]
-_LOW, _HIGH, _N = Polynomial([0.5, -0.5]), Polynomial([0.5, 0.5]), DEGREE - 1
+_LOW = Polynomial([0.5, -0.5])
+_HIGH = Polynomial([0.5, 0.5])
+_N = DEGREE - 1
 _BASIS: Any = np.stack(
     [(_LOW ** (_N - j) * _HIGH**j * math.comb(_N, j)).coef for j in range(DEGREE)]
 )
@@ -144,7 +145,8 @@ def _fit_intervals(values: Values, ends: FloatArray) -> FloatArray:
 
 def side_pieces(side: Side, rtol: float) -> Pieces:
     """The records of a side, its first one excepted: octaves of x in buckets, doubled until all meet the tolerance."""
-    first, coarse = math.floor(math.log2(side.start)), rtol > COARSE
+    first = math.floor(math.log2(side.start))
+    coarse = rtol > COARSE
     slopes = (COARSE_SLOPES if coarse else SLOPES) * rtol
     counts = {e: 1 if coarse else FIRST_BUCKETS.get(e, 2) for e in range(first, 0)}
     cuts: dict[int, list[tuple[float, float]]] = {}
@@ -171,9 +173,11 @@ def side_pieces(side: Side, rtol: float) -> Pieces:
                 f"the law needs more than {MAX_RECORDS} pieces for {rtol:.1e}",
                 np.array(True),
             )
-    rows, place = [], 0
+    rows = []
+    place = 0
     for e, count in counts.items():
-        power, start = count.bit_length() - 1, cuts[e][0][0]
+        power = count.bit_length() - 1
+        start = cuts[e][0][0]
         skipped = int((start / 2.0**e - 1) * count)
         passed = sum(kink <= start for kink in side.kinks)
         rows.append((52 - power, place - ((e + 1023) << power) - skipped - passed))
@@ -240,16 +244,15 @@ def straight_record(values: Values, start: float) -> First:
     basis = np.stack([np.ones_like(t), np.log(t), t], axis=-1)
     constants, *_ = np.linalg.lstsq(basis, logs.T, rcond=None)
     missed = np.abs(basis @ constants - logs.T).max(axis=0)
-    record, lead = np.zeros(RECORD), np.exp(constants[0])
+    record = np.zeros(RECORD)
+    lead = np.exp(constants[0])
     record[RATE] = 1 / start
     record[[FORCE_AT, AREA_AT]], record[[FORCE_AT + 1, AREA_AT + 1]] = (
         lead,
         lead * constants[2],
     )
-    powers, value = (
-        (float(constants[1, 0]), float(constants[1, 1])),
-        np.expm1(missed) + constants[2] ** 2,
-    )
+    powers = (float(constants[1, 0]), float(constants[1, 1]))
+    value = np.expm1(missed) + constants[2] ** 2
     return record, np.array([value.max(), (value * powers + 2 * missed).max()]), powers
 
 
@@ -265,7 +268,8 @@ def assemble(
     low = min(side.start for side in sides)
     lowest = math.floor(math.log2(low))
     rows = np.full((len(sides), -lowest, 2), (63, 0))
-    every, start = sum(len(side.kinks) for side in sides), 1
+    every = sum(len(side.kinks) for side in sides)
+    start = 1
     for of_side, side, piece in zip(rows, sides, pieces, strict=True):
         of_side[-lowest - len(piece.rows) :] = piece.rows
         # kinks of the other side are passed on all of this one
@@ -313,15 +317,19 @@ def fill_energies(
     last: float,
 ) -> None:
     """Energies, integrals of force over d, into the records; `last` is that beyond the gaps covered."""
-    first, begins, k = records[0], signs[0] < 0, np.arange(1, KEPT + 1)
+    first = records[0]
+    begins = signs[0] < 0
+    k = np.arange(1, KEPT + 1)
     if not first[RATE]:
         # none is needed: what rounds below the law's end goes by the next one
         first[:] = records[1]
     of_first = (first[FORCE_AT:AREA_AT] / (power + k)).sum() / (scale * first[RATE])
     own = records[order]
-    shares, per_d = own[:, FORCE_AT:AREA_AT] / k, scale * own[:, RATE]
+    shares = own[:, FORCE_AT:AREA_AT] / k
+    per_d = scale * own[:, RATE]
     # from t = 0 to either end, of which t = s faces last contact
-    upper, lower = shares.sum(axis=1) / per_d, (shares * (-1.0) ** k).sum(axis=1) / per_d
+    upper = shares.sum(axis=1) / per_d
+    lower = (shares * (-1.0) ** k).sum(axis=1) / per_d
     reached = np.concatenate([[of_first if begins else last], upper - lower]).cumsum()
     records[order, ENERGY_AT] = reached[:-1] + np.where(signs > 0, upper, -lower)
     if not begins:
@@ -384,7 +392,8 @@ def inverse_block(which: int, block: FloatArray, end: float) -> FloatArray:
         edges = np.insert(
             edges, np.searchsorted(edges, max(turn, bottom)), max(turn, bottom)
         )
-    centre, half = (edges[1:] + edges[:-1]) / 2, (edges[1:] - edges[:-1]) / 2
+    centre = (edges[1:] + edges[:-1]) / 2
+    half = (edges[1:] - edges[:-1]) / 2
     wanted = (centre[:, None] + half[:, None] * POINTS).ravel()
     x, side = np.empty((2, wanted.size))
     core.inverse_nodes(wanted, block, which, end, x, side)

@@ -62,10 +62,9 @@ SPACED = (
     0.2,
 )  # shares of the compression: geometric spacing between them, then even
 ROUNDING = 4 * float(np.finfo(float).eps)
-LIGHT, HEAVY = (
-    1e-2,
-    0.99,
-)  # overclosures of the default ends of a continued law, over that of the law's last
+# overclosures of the default ends of a continued law, over that of the law's last
+LIGHT = 1e-2
+HEAVY = 0.99
 SCAN = 49  # gaps at which a law's stiffness is looked at for its maximum
 DIGITS = 10.0  # times a law's error: smaller decreases of stiffness are errors of the polynomials
 
@@ -197,11 +196,9 @@ class ContactLaw(Law, LawQuantities, Displayed):
         """Gaps as they were given, and as separations d, within the law."""
         gaps = finite_array(name, self.units.number(name, given))
         mean = name == "mean_separation"
-        d, least, most = (
-            2 * gaps - self.h_max if mean else gaps,
-            self.lowest,
-            self.highest,
-        )
+        d = 2 * gaps - self.h_max if mean else gaps
+        least = self.lowest
+        most = self.highest
         # ends that are no round numbers are met but for rounding
         slack = 0.0 if least == -self.h_max else ROUNDING * self.h_max
         shown_least, shown_most = (
@@ -322,11 +319,11 @@ class ContactLaw(Law, LawQuantities, Displayed):
 
     def _inverse(self, name: str, given: Any, count: int = 1) -> Any:
         """Gaps of pressures or areas, and with a `count` of 3 area and -dF/du there."""
-        which, inverse = (
-            (FORCE if name == "pressure" else AREA),
-            self._inverse_block(name),
-        )
-        least, most, end = inverse[at.Y_LEAST], inverse[at.Y_HIGH], inverse[at.END]
+        which = FORCE if name == "pressure" else AREA
+        inverse = self._inverse_block(name)
+        least = inverse[at.Y_LEAST]
+        most = inverse[at.Y_HIGH]
+        end = inverse[at.END]
 
         def check(given: Any) -> FloatArray:
             wanted = finite_array(name, given)
@@ -334,7 +331,8 @@ class ContactLaw(Law, LawQuantities, Displayed):
                 return wanted
             known = self.units.length, self.units.stress if name == "pressure" else None
             length, unit = ("" if own in (None, "1") else f" {own}" for own in known)
-            low, high = f"at least {least:.6g}{unit}", f"at most {most:.6g}{unit}"
+            low = f"at least {least:.6g}{unit}"
+            high = f"at most {most:.6g}{unit}"
             require(name, wanted, wanted >= 0, "at least 0")
             require(
                 name,
@@ -384,19 +382,15 @@ class ContactLaw(Law, LawQuantities, Displayed):
         polynomials, and for MBMA that of the islands as it propagates to slopes; not the
         error of another theory itself.
         """
-        d, head, words = (
-            self.separations(mean_separation, separation),
-            self.block,
-            self.block.view(np.int64),
-        )
+        d = self.separations(mean_separation, separation)
+        head = self.block
+        words = self.block.view(np.int64)
         x = (self.h_max + np.where(d < 0, head[at.MINUS], head[at.PLUS]) * d) * head[
             at.SCALE
         ]
         # the records that hold the gaps, by shift and base of each octave of x
-        rows, bits = (
-            words[at.HEAD : words[at.RECORDS]].reshape(-1, 2),
-            np.clip(x, head[at.LOW], head[at.HIGH]),
-        )
+        rows = words[at.HEAD : words[at.RECORDS]].reshape(-1, 2)
+        bits = np.clip(x, head[at.LOW], head[at.HIGH])
         bits = bits.view(np.int64)
         row = rows[
             (bits >> 52) - words[at.EXPONENT] + np.where(d < 0, words[at.MINUS_ROWS], 0)
@@ -413,7 +407,8 @@ class ContactLaw(Law, LawQuantities, Displayed):
         return bound[()]
 
     def _facts(self) -> dict[str, str]:
-        unit, modulus = self.units.length or "1", unit_of("pressure", self.units)
+        unit = self.units.length or "1"
+        modulus = unit_of("pressure", self.units)
         known = {
             "theory": self.theory,
             "variant": self.variant,
@@ -436,10 +431,8 @@ class ContactLaw(Law, LawQuantities, Displayed):
 
     def _variables(self) -> dict[str, Variable]:
         ends = min(self.highest, self.h_max), max(self.lowest, -self.h_max)
-        light, deep = (
-            np.geomspace(*SPACED, SHOWN_POINTS // 2)[:-1],
-            np.linspace(SPACED[1], 1.0, SHOWN_POINTS // 2),
-        )
+        light = np.geomspace(*SPACED, SHOWN_POINTS // 2)[:-1]
+        deep = np.linspace(SPACED[1], 1.0, SHOWN_POINTS // 2)
         d = np.maximum(
             ends[0] + (ends[1] - ends[0]) * np.concatenate([light, deep]), ends[1]
         )
@@ -613,7 +606,8 @@ class ContactLaw(Law, LawQuantities, Displayed):
         if not falls.any():
             return None
         peak = int(falls.argmax())
-        low, high = u[peak + 1], min(u[peak] + step, self.h_max)
+        low = u[peak + 1]
+        high = min(u[peak] + step, self.h_max)
         near = {
             "bounds": (low, high),
             "method": "bounded",
@@ -642,12 +636,8 @@ class ContactLaw(Law, LawQuantities, Displayed):
     def _figure(self) -> Any:
         held = self._variables()
         lines = (held[name].values for name in ("mean_separation", "pressure", "area"))
-        pressure, gap = (
-            pressure_label(unit_of("pressure", self.units)),
-            self.units.length or "length",
-        )
-        curve, gap = (
-            Curve(theory_label(self.theory), *lines),
-            f"mean separation u [{gap}]",
-        )
+        pressure = pressure_label(unit_of("pressure", self.units))
+        gap = self.units.length or "length"
+        curve = Curve(theory_label(self.theory), *lines)
+        gap = f"mean separation u [{gap}]"
         return draw_compression([curve], pressure_label=pressure, gap_label=gap)

@@ -17,10 +17,9 @@ from mbma_tables.quantities.effective_medium import wide_gap
 from mbma_tables.quantities.leakage import along, degrees, flow, shipped_flow
 from mbma_tables.surfaces.any_surface import AnySurface, apply
 
-RTOL, SHARE = (
-    1e-4,
-    0.1,
-)  # tolerance of the polynomials, or this share of the law's own error
+# tolerance of the polynomials, or this share of the law's own error
+RTOL = 1e-4
+SHARE = 0.1
 MOST_OCTAVES = (
     20  # octaves of gaps from the blocked one; nearer to it the flow is a power
 )
@@ -94,7 +93,8 @@ def leakage_law(
     law: Any, surface: AnySurface, direction: float | None = None
 ) -> LeakageLaw:
     """Leakage of a contact law's surface; of a simulated map in a direction in degrees, or the mean of both axes."""
-    h_rms, rtol = float(surface.h_rms), max(RTOL, SHARE * law.error)
+    h_rms = float(surface.h_rms)
+    rtol = max(RTOL, SHARE * law.error)
     top = (
         min(law.h_max, law.highest) if law.block.view(np.int64)[fit.ENDS] else law.highest
     )

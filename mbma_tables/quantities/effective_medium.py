@@ -25,11 +25,10 @@ from mbma_tables.theories.calibrated.formulas import (
 
 LARGEST_AREA = 0.3  # above it cells of one spectrum differ by factors
 BANDS = 64  # bands of a spectrum, graded towards both ends
-NODES, LOWEST_GAP, REACH = (
-    80,
-    1e-6,
-    8.0,
-)  # quadrature in ln(h/s), from u1/s - 8 or 1e-6 to u1/s + 8
+# quadrature in ln(h/s), from u1/s - 8 or 1e-6 to u1/s + 8
+NODES = 80
+LOWEST_GAP = 1e-6
+REACH = 8.0
 NO_SLOPE = 1e-12  # share of the squared gradient that the last bands hold at least
 NO_COVER = 1e-13  # share of the surface between two magnifications
 NEAREST = 1e-4  # least distance of A/A0 to the threshold
@@ -79,7 +78,8 @@ class Gaps:
     def quadrature(self) -> tuple[FloatArray, FloatArray]:
         """Shares of the surface and ln h^3 of gaps there [h_rms^3], shape (loads, points)."""
         centre = self.mean / self.spread
-        low, high = np.log(np.maximum(centre - REACH, LOWEST_GAP)), np.log(centre + REACH)
+        low = np.log(np.maximum(centre - REACH, LOWEST_GAP))
+        high = np.log(centre + REACH)
         node, weight = np.polynomial.legendre.leggauss(NODES)
         half = (high - low)[..., None] / 2
         t = np.exp(low[..., None] + half * (1 + node))
@@ -98,7 +98,8 @@ def _shares(spectrum: Spectrum) -> tuple[FloatArray, FloatArray, FloatArray]:
     log_x = np.log(spectrum.x / spectrum.x[0])
     edges = log_x[-1] * 0.5 * (1 - np.cos(np.pi * np.arange(BANDS + 1) / BANDS))
     band = np.clip(np.searchsorted(edges, log_x, side="right") - 1, 0, BANDS - 1)
-    x, variance = spectrum.x, spectrum.variance
+    x = spectrum.x
+    variance = spectrum.variance
     parts = [
         np.bincount(band, v, BANDS).astype(float)
         for v in (variance, variance * x**2, variance * x)
@@ -118,7 +119,8 @@ def gaps(spectrum: Spectrum, force: ArrayLike, constants: Constants = CONSTANTS)
         cover = area(np.minimum(load / np.sqrt(below), 1e8), spectrum.alpha, constants)
     above = np.append(np.cumsum(variance[::-1])[::-1], 0.0)
     spread = np.sqrt(above[:-1])
-    mean, middle = np.zeros((load.size, variance.size + 1)), (below[:-1] + below[1:]) / 2
+    mean = np.zeros((load.size, variance.size + 1))
+    middle = (below[:-1] + below[1:]) / 2
     for first in range(variance.size):
         # wavenumbers from this band on as a spectrum of their own, lengths over `spread`,
         # loads over its gradient

@@ -13,16 +13,18 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.shared import shared
 
-BEND, LIGHT, SOFT, POWER = 0.3, 0.004, 0.3, 1.2  # constants of q
-DEEP, DEEPEST = (
-    2.5,
-    1.25,
-)  # d above which it is this much of u/h_rms at most: in the lightest contact s is h_rms
+# constants of q
+BEND = 0.3
+LIGHT = 0.004
+SOFT = 0.3
+POWER = 1.2
+# d above which it is this much of u/h_rms at most: in the lightest contact s is h_rms
+DEEP = 2.5
+DEEPEST = 1.25
 FIRST = 1e-5  # A/A0 below which gaps go over to those before contact, without a jump
-TAIL, NODES = (
-    8.0,
-    96,
-)  # range of heights in standard deviations, and number of quadrature nodes
+# range of heights in standard deviations, and number of quadrature nodes
+TAIL = 8.0
+NODES = 96
 FULLEST = 1 - 1e-12
 BLOCK = 1 << 12  # contacts between two checks for Ctrl-C, each with NODES gaps
 R = 8.314462618  # J/(mol K)
@@ -105,14 +107,13 @@ def jump_of(
             f"no gas is named {gas!r}: {nearest(str(gas), [*GASES, VACUUM])}"
         )
     one = GASES[gas]
-    T, P = (
-        finite_array("temperature", temperature),
-        finite_array("gas_pressure", pressure),
-    )
+    T = finite_array("temperature", temperature)
+    P = finite_array("gas_pressure", pressure)
     share = finite_array(
         "accommodation", one.accommodation if accommodation is None else accommodation
     )
-    low, high = TEMPERATURES[0], TEMPERATURES[-1]
+    low = TEMPERATURES[0]
+    high = TEMPERATURES[-1]
     require("temperature", T, (low <= T) & (high >= T), f"from {low:g} to {high:g} K")
     require("gas_pressure", P, P > 0, "positive; 'vacuum' is without a gas")
     require("accommodation", share, (share > 0) & (share <= 1), "in (0, 1]")
@@ -196,7 +197,8 @@ def open_gaps(
     d = gap / height + (d - gap / height) * weight
     q = 1 + BEND * share / (share + LIGHT) * -np.expm1(-((cap / SOFT) ** POWER))
     node, share_of_node = _rule()
-    low, high = np.maximum(d - TAIL, 0.0), np.maximum(d + TAIL, 0.0)
+    low = np.maximum(d - TAIL, 0.0)
+    high = np.maximum(d + TAIL, 0.0)
     y = low + (high - low) * node
     density = (
         np.exp(-((d - y) ** 2) / 2)

@@ -12,11 +12,14 @@ from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.quantities.effective_medium import NEAREST, FlowConstants
 from mbma_tables.quantities.gas import NODES, open_gaps
 
-ROUNDS, RESOLVED = 200, 1e-11
+ROUNDS = 200
+RESOLVED = 1e-11
 # root mean square of ln(medium/simulation) at 16 surfaces with gamma from 1 to 8, `python
 # -m generate film`: phi without contact; addition by a lay per e-fold of gamma and A/A0 to
 # the power 1.2; phi_s
-OPEN, LAY, SHEAR = 0.022, (12.0, 1.2), 0.15
+OPEN = 0.022
+LAY = (12.0, 1.2)
+SHEAR = 0.15
 # gamma, or its inverse, up to which flow, and anisotropy up to which stiffness was
 # simulated
 WIDEST_LAY = 8.5

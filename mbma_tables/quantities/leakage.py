@@ -63,7 +63,8 @@ KEPT = 64  # spectra whose factors are kept
 # maps that are valid for the calibrated law and of others; at these contacts of the data
 # set's group machined
 MAP_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39)
-LIKE_GAUSSIAN, OTHERS = (0.29, 0.60, 0.89, 1.9, 6.3), (0.84, 1.3, 1.9, 3.0, 7.3)
+LIKE_GAUSSIAN = (0.29, 0.60, 0.89, 1.9, 6.3)
+OTHERS = (0.84, 1.3, 1.9, 3.0, 7.3)
 SIMULATED = 64.0  # zeta_1 up to which flow was simulated
 MEANINGS = {
     "K": "flow coefficient",
@@ -310,7 +311,8 @@ def reasons_against(
     theory: Theory, surface: Any, u: FloatArray, E_star: Any, area: FloatArray
 ) -> dict[str, Any]:
     """Reasons why the flow is not valid, in addition to those for the contact."""
-    simulated, everywhere = _simulated(theory), np.ones(np.shape(area), bool)
+    simulated = _simulated(theory)
+    everywhere = np.ones(np.shape(area), bool)
     if simulated is not None:
         found = dict(simulated.flow_trust(surface, u, area)[1])
     else:
@@ -390,8 +392,11 @@ def _flow(
     """u^3 (1 - 1.5/(u^2 + 4)) R, and 0 from A/A0 = threshold on; ln R over ln A/(threshold A0 - A)."""
     # below the table ln R is in proportion to A^obstruction, above it R is a power of
     # threshold - A/A0
-    numbers, found = given[1], np.empty(u.shape)
-    threshold, obstruction, first = numbers[10], numbers[11], numbers[2]
+    numbers = given[1]
+    found = np.empty(u.shape)
+    threshold = numbers[10]
+    obstruction = numbers[11]
+    first = numbers[2]
     last = first + given[2][2] / numbers[5]
 
     def fill(k: slice) -> None:

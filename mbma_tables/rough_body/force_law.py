@@ -32,10 +32,9 @@ from mbma_tables.theories.mbma.half_space import Basis, basis, gauss_legendre, m
 
 RTOL = 1e-7  # tolerance of the force of one contact
 NODES = (24, 32, 48, 64, 96, 128, 192, 256, 384, 512)  # numbers of nodes, tried in turn
-STEPS, SETTLED = (
-    100,
-    1e-12,
-)  # steps of Newton's method, and size of the last one over the lengths that add up
+# steps of Newton's method, and size of the last one over the lengths that add up
+STEPS = 100
+SETTLED = 1e-12
 EDGE = 1e-10  # share of the largest pressure that defines the edge
 # share of a law's error, by which its polynomials differ where they meet: sufficient
 # accuracy of forces
@@ -58,7 +57,8 @@ def plane_basis(nodes: int) -> Basis:
     """
     x, weights = (part[nodes:] for part in gauss_legendre(2 * nodes))
     x = 2 * x - 1
-    m, n = 2.0 * np.arange(nodes)[:, None], 2.0 * np.arange(nodes)
+    m = 2.0 * np.arange(nodes)[:, None]
+    n = 2.0 * np.arange(nodes)
     with np.errstate(divide="ignore", invalid="ignore"):
         overlap = (
             4
@@ -144,13 +144,15 @@ class Body:
 
     def _newton(self, approach: float, radius: float, nodes: int) -> Solved:
         known = plane_basis(nodes) if self.plane else basis(nodes)
-        root, operator = known.root_weights, radius * known.operator
+        root = known.root_weights
+        operator = radius * known.operator
         if self.plane:
             operator = operator + 4 / math.pi * radius * math.log(
                 self.reference / radius
             ) * np.outer(root, root)
         rigid = known.v * radius**2 / (2 * self.radius) - approach
-        w, scale = np.zeros(nodes), abs(approach) + float(np.abs(rigid).max())
+        w = np.zeros(nodes)
+        scale = abs(approach) + float(np.abs(rigid).max())
         for _ in range(STEPS):
             p, k = self.layer(rigid + w / root)
             jacobian = np.eye(nodes) + operator * k
@@ -174,10 +176,8 @@ class Body:
             t = np.linspace(0, 1, PLACES * nodes + 1)
             p = self.layer(self.between(found, found.u, t))[0]
             edge = t[min(int(np.flatnonzero(p > EDGE * p.max())[-1]) + 1, len(t) - 1)]
-            before, found = (
-                self.integral(found, found.p),
-                self._newton(approach, found.radius * edge, nodes),
-            )
+            before = self.integral(found, found.p)
+            found = self._newton(approach, found.radius * edge, nodes)
             error = abs(before / self.integral(found, found.p) - 1)
             if error <= max(rtol, JUMPS * self.law.error):
                 break
@@ -189,7 +189,8 @@ class Body:
 
     def quantities(self, at: Solved) -> tuple[float, float, float]:
         """Force over E*, its derivative by the approach over E*, and the real area."""
-        middle, low = finite_array("mean_separation", at.u.min()), self.ends[0]
+        middle = finite_array("mean_separation", at.u.min())
+        low = self.ends[0]
         allowed = f"at least {low:.6g}, where the law of {self.law.theory!r} ends"
         require(
             "mean_separation in the middle",
@@ -227,7 +228,8 @@ class Body:
             found = self.solved(approach, RTOL)
             return math.log(self.integral(found, found.p) / force)
 
-        low, high = smooth - wide * (1 - 1e-9), smooth - thin + 2 * FLAT * wide
+        low = smooth - wide * (1 - 1e-9)
+        high = smooth - thin + 2 * FLAT * wide
         # no layer is thinner than its law allows: there may be no such force
         if miss(high) < 0:
             self.quantities(self.solved(high, RTOL))
@@ -236,11 +238,9 @@ class Body:
 
 def units_of(units: Units, plane: bool) -> tuple[dict[str, str], float]:
     """Units by quantity, and the factor from stress times area to the unit of force."""
-    length, force, newtons = (
-        unit_of("approach", units),
-        unit_of("energy" if plane else "island_force", units),
-        1.0,
-    )
+    length = unit_of("approach", units)
+    force = unit_of("energy" if plane else "island_force", units)
+    newtons = 1.0
     if units.length is not None and units.stress in SIZES["stress"]:
         force, per = ("N/mm", 1e-3) if plane else ("N", 1.0)
         newtons = (
@@ -265,7 +265,8 @@ def forces(given: Any, body: Body, length: str | None) -> Any:
         return [forces(value, body, length) for value in given]
     if not isinstance(given, str):
         return given
-    found, unit = _FORCE.fullmatch(given), body.units["force"]
+    found = _FORCE.fullmatch(given)
+    unit = body.units["force"]
     if found is None or (found[3] is None) == body.plane or unit not in ("N", "N/mm"):
         known = (
             "the units of surface and E_star are known"

@@ -53,7 +53,8 @@ COUNTED = 0.1  # share of the force above which a reason against the layer's law
 # c and p of c/n^p, the standard deviation of one sphere's approach over h_rms, with n the
 # width of the contact over the mean wavelength, and the least n: of boundary elements of 24
 # spheres, `python -m generate rough_spheres`
-CELLS, NARROWEST = (0.62, 0.8), 1.5
+CELLS = (0.62, 0.8)
+NARROWEST = 1.5
 WIDEST = 0.1  # contact radius over R, beyond which bodies are no half-spaces
 
 
@@ -134,10 +135,12 @@ class RoughContact(Displayed):
         }
 
     def _figure(self) -> Any:
-        figure, units = new_figure(10, 4), self.units
+        figure = new_figure(10, 4)
+        units = self.units
         profile, curve = figure.subplots(1, 2)
         rows = [np.reshape(part, (-1, POINTS)) for part in (self.position, self.pressure)]
-        force, approach = np.ravel(self.force), np.ravel(self.approach)
+        force = np.ravel(self.force)
+        approach = np.ravel(self.approach)
         order = np.argsort(approach)
         for k in order[np.unique(np.linspace(0, len(order) - 1, 5).astype(int))]:
             profile.plot(rows[0][k], rows[1][k], label=f"{force[k]:.3g} {units['force']}")
@@ -226,7 +229,9 @@ def rough_contact(
             f"shape must be one of {SHAPES}, got {shape!r}{nearest(str(shape), SHAPES)}"
         )
     law = contact_law(surface, bodies, theory, rtol=LAYER_RTOL)
-    units, plane, largest = law.units, shape == "cylinder", 1e30 * law.h_max
+    units = law.units
+    plane = shape == "cylinder"
+    largest = 1e30 * law.h_max
     R = number_in("radius", units.number("radius", radius), law.h_max, largest)
     fixed = JOHNSON * R if reference is None else units.number("reference", reference)
     if not plane and reference is not None:
@@ -261,7 +266,9 @@ def rough_contact(
 
 def pressed(body: Body, wanted: FloatArray) -> RoughContact:
     """The contacts at some approaches [length]."""
-    rows, profiles, rule = [], [], basis(MOMENTS)
+    rows = []
+    profiles = []
+    rule = basis(MOMENTS)
     reasons: dict[str, list[bool]] = {}
     scale = body.law.E_star * body.newtons
     for k, approach in enumerate(map(float, wanted.ravel())):
@@ -304,7 +311,8 @@ def pressed(body: Body, wanted: FloatArray) -> RoughContact:
 
 def _trust(body: Body, found: Solved, force: float) -> tuple[float, list[str]]:
     """Standard deviation of ln F by that of the law, alike at all places, and reasons against the law."""
-    law, ends = body.law, body.ends
+    law = body.law
+    ends = body.ends
     u = np.clip(found.u, *ends)
     bodies = Bodies(law.E_star, hardness=law.hardness)
     known = contact(body.surface, bodies, mean_separation=u, theory=body.theory)

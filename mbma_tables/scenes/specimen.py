@@ -65,7 +65,8 @@ class Specimen:
 
     def in_units(self, length: str | None, stress: str | None) -> Specimen:
         """The specimen in the requested units: converted from known units, else taken to be in them."""
-        modulus, unit = self.E_star, self.stress_unit
+        modulus = self.E_star
+        unit = self.stress_unit
         if stress is not None:
             stress = known(stress, "stress")
             if modulus is not None and unit is not None:
@@ -87,10 +88,8 @@ def _from_map(path: pathlib.Path, options: dict[str, Any], unit: str | None) -> 
 
         surface = BoundaryElements.from_netcdf(path).surface
         return Specimen(in_unit(surface, unit), f"simulated map: {_printable(path)}")
-    fitted, surface = (
-        options.pop("model", "") == "self-affine",
-        measured(path, options | {"unit": unit})[1],
-    )
+    fitted = options.pop("model", "") == "self-affine"
+    surface = measured(path, options | {"unit": unit})[1]
     title = f"{'fitted to the map' if fitted else 'measured:'} {_printable(path)}"
     return Specimen(surface.fit() if fitted else surface, title)
 

@@ -91,12 +91,11 @@ class Heights:
             return dataclasses.replace(sum_of_both, top=top)
         # as fine in both tails as in the middle
         edges = ndtr(np.linspace(-6.0, 6.0, TAIL_NODES + 1))
-        share, weight = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+        share = (edges[1:] + edges[:-1]) / 2
+        weight = np.diff(edges)
         one, two = (np.interp(share, SHARES, each.quantiles) for each in (self, other))
-        sums, weights = (
-            np.add.outer(one, two).ravel(),
-            np.multiply.outer(weight, weight).ravel(),
-        )
+        sums = np.add.outer(one, two).ravel()
+        weights = np.multiply.outer(weight, weight).ravel()
         order = np.argsort(-sums)
         above = np.cumsum(weights[order]) - weights[order] / 2
         deviates = ndtri(np.clip(above / weights.sum(), MIN_SHARE, 1 - 1e-16))
@@ -156,7 +155,9 @@ def highest_point(
         "probability": probability,
     }
     arrays = {name: positive_array(name, value) for name, value in given.items()}
-    height, slope, chance = arrays["h_rms"], arrays["m2"], arrays["probability"]
+    height = arrays["h_rms"]
+    slope = arrays["m2"]
+    chance = arrays["probability"]
     require("probability", chance, chance < 1, "between 0 and 1")
     area = np.broadcast_to(arrays["nominal_area"], broadcast_shape(**arrays))
     with np.errstate(over="ignore"):  # what is infinite is refused as too small an area

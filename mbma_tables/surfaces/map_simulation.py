@@ -46,11 +46,9 @@ class MapSimulation:
     def resized(self, up: float, along: float) -> MapSimulation:
         """For the surface with heights multiplied by `up` and lengths along the plane by `along`."""
         by = np.array([[up / along], [1.0], [up], [up**2 / along]])
-        gaps, flow, left_out = (
-            self.flow_gaps * up,
-            self.flow * up**3,
-            self.left_out * along,
-        )
+        gaps = self.flow_gaps * up
+        flow = self.flow * up**3
+        left_out = self.left_out * along
         return dataclasses.replace(
             self, rows=self.rows * by, flow_gaps=gaps, flow=flow, left_out=left_out
         )

@@ -51,7 +51,8 @@ def radial_spectrum(
     pi)^2/(nx dx ny dy) is the ring's variance of height.
     """
     nx, ny = heights.shape
-    step_x, step_y = 2 * math.pi / (nx * dx), 2 * math.pi / (ny * dy)
+    step_x = 2 * math.pi / (nx * dx)
+    step_y = 2 * math.pi / (ny * dy)
     power = np.abs(np.fft.fft2(heights)) ** 2 / (nx * ny) ** 2 / (step_x * step_y)
     q = np.hypot(
         step_x * nx * np.fft.fftfreq(nx)[:, None], step_y * ny * np.fft.fftfreq(ny)
@@ -61,11 +62,13 @@ def radial_spectrum(
     if measured.size == 0:
         raise InputError("every wavelength of the map is shorter than two sampling steps")
     inside &= (q >= measured.min()) & (q <= measured.max())
-    q, strength = q[inside], power[inside]
+    q = q[inside]
+    strength = power[inside]
     ring = np.rint(RINGS * q / min(step_x, step_y)).astype(int)
     waves: FloatArray = np.bincount(ring).astype(float)
     filled = waves > 0
-    total, waves = np.bincount(ring, strength)[filled], waves[filled]
+    total = np.bincount(ring, strength)[filled]
+    waves = waves[filled]
     return np.bincount(ring, q)[filled] / waves, total / waves, waves
 
 
@@ -82,12 +85,11 @@ def prepared(
         {name: given.pop(name) for name in ("dx", "dy") if name in given},
         given.pop("unit", None),
     )
-    channel, periodic = given.pop("channel", None), given.pop("periodic", None)
+    channel = given.pop("channel", None)
+    periodic = given.pop("periodic", None)
     if isinstance(source, str | os.PathLike):
-        source, lengths = (
-            read_measurement(source, **lengths, unit=unit, channel=channel),
-            {},
-        )
+        source = read_measurement(source, **lengths, unit=unit, channel=channel)
+        lengths = {}
     elif channel is not None:
         raise InputError("channel belongs to a file")
     dimensions = source.dim if dimensions is None else dimensions
@@ -96,7 +98,8 @@ def prepared(
     )
     own = unit if own is None else known(own)
     if own is not None and unit not in (None, own):
-        by, own = factor(own, unit), unit
+        by = factor(own, unit)
+        own = unit
         # given steps are in the given unit
         grid, steps = grid * by, steps if lengths else tuple(step * by for step in steps)
     units = Units(own)
@@ -109,14 +112,16 @@ def prepared(
 
 def points_of_fit(surface: SpectralSurface) -> dict[str, Any]:
     """Arguments of `fit_spectrum`: rings of a map's spectrum, else the samples."""
-    treated, known = surface.map, surface.bearing
+    treated = surface.map
+    known = surface.bearing
     if known is not None and known.slope_kurtosis > MAX_KURTOSIS:
         raise NotSelfAffineError(
             f"the map's slopes lie in a few edges or spikes: their kurtosis is {known.slope_kurtosis:.3g}, "
             f"more than {MAX_KURTOSIS:g} (3: Gaussian)"
         )
     if treated is None:
-        q, C = surface.q, surface.C
+        q = surface.q
+        C = surface.C
         width = np.diff(q, prepend=q[0]) + np.diff(q, append=q[-1])
         counts = np.ones(q.size) if surface.samples is None else surface.samples
         given = {"q": q, "C": C, "counts": counts, "variances": np.pi * C * q * width}
@@ -163,10 +168,9 @@ def _rings(
 # grid steps in wavenumber; a window weights the few wavelengths below at random; none lies
 # on this limit
 LONG = 4.0 * (1 - 1e-9)
-RAISED, MET = (
-    6.0,
-    1e-6,
-)  # largest change of ln C of the strongest wavelengths under a window; tolerance of the sums
+# largest change of ln C of the strongest wavelengths under a window; tolerance of the sums
+RAISED = 6.0
+MET = 1e-6
 STEEPEST = 30.0  # largest tilt of a spectrum in `matched`
 TOLD = 0.05  # relative difference of rms gradients that is reported, and half of that of h_rms
 
@@ -246,10 +250,8 @@ def _disagreement(
 ) -> list[str]:
     """Lines to report if a spectrum differs in variance or mean squared gradient from the heights."""
     laws = PowerLaws(q, C)
-    h_rms, gradient = (
-        math.sqrt(laws.moment(0) / variance),
-        math.sqrt(2 * laws.moment(2) / slopes),
-    )
+    h_rms = math.sqrt(laws.moment(0) / variance)
+    gradient = math.sqrt(2 * laws.moment(2) / slopes)
     if max(abs(h_rms - 1), abs(gradient - 1)) <= TOLD:
         return []
     return [
@@ -289,7 +291,9 @@ def measured_map(treated: Treated) -> SpectralSurface:
         ]
 
     notes: list[dict[str, Any]] = []
-    C_bins, variance, whole = np.exp(bins.log_c), own.h_rms**2, slopes(0.0)
+    C_bins = np.exp(bins.log_c)
+    variance = own.h_rms**2
+    whole = slopes(0.0)
     if treated.periodic:
         changed = raised(bins.q, C_bins, variance, whole)
         # a tilt if there are many long wavelengths, as for a step
@@ -301,7 +305,8 @@ def measured_map(treated: Treated) -> SpectralSurface:
         few = _disagreement(bins.q, C_bins, variance, whole)
         notes += [{"step": "few wavelengths", "told": line} for line in few]
     else:
-        seen, floor = C * waves * q**2 * grid[0] * grid[1], LONG * max(grid)
+        seen = C * waves * q**2 * grid[0] * grid[1]
+        floor = LONG * max(grid)
         parts = float(seen[q >= floor].sum()), slopes(floor)
         C_bins, note = _unwindowed(
             bins.q, C_bins, variance, whole, float(seen.sum()), parts
@@ -356,7 +361,8 @@ def extrapolated(surface: S, shortest: Any, hurst: Any) -> S:
         1e30,
     )
     exponent = number_in("extrapolate_hurst", hurst, 0.0, 1.0)
-    last, end = float(surface.q1), 2 * math.pi / wave
+    last = float(surface.q1)
+    end = 2 * math.pi / wave
     if not end > last:
         raise InputError(
             f"extrapolate_to must be below the shortest measured wavelength, {2 * math.pi / last:.6g}, got {wave:g}"

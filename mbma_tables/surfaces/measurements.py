@@ -18,14 +18,14 @@ from mbma_tables.common.files import numbers_of, read_file
 from mbma_tables.common.units import factor, known
 
 LISTS = (2, 3)  # columns of a list of points, as opposed to a matrix of heights
-MAX_TEXT_BYTES, MAX_HEADER_BYTES = 256 * 2**20, 2**14
+MAX_TEXT_BYTES = 256 * 2**20
+MAX_HEADER_BYTES = 2**14
 TEXTS = (".csv", ".txt", ".asc", ".xyz")  # names of files that hold numbers as text
 CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")  # bytes that no text has
 INFINITE = re.compile(rb"(?i)(?<![a-z])inf(inity)?(?![a-z])")
-MIN_LENGTH, MAX_LENGTH = (
-    1e-30,
-    1e30,
-)  # in any unit: their fourth powers, as in C, neither overflow nor underflow
+# in any unit: their fourth powers, as in C, neither overflow nor underflow
+MIN_LENGTH = 1e-30
+MAX_LENGTH = 1e30
 
 
 def library() -> Any:
@@ -50,7 +50,8 @@ def read_measurement(
     semicolons, tabs, blanks or commas; a comma is a decimal mark where another separator is
     used.
     """
-    module, place = library(), pathlib.Path(path)
+    module = library()
+    place = pathlib.Path(path)
     piped = os.fspath(path) == "-"
     if not piped and not os.path.isfile(place):
         raise InputError(

@@ -239,7 +239,8 @@ def _band_of(
     q = bins.q
     q0, q1 = ends
     if law.start:
-        before, first = q[law.start - 1], q[law.start]
+        before = q[law.start - 1]
+        first = q[law.start]
         q0 = math.sqrt(before * first)
         if law.level is not None:
             crossing = unit * math.exp((law.log_k - law.level) / law.slope)

@@ -46,10 +46,9 @@ PRESSED = {
     "kurtosis of slopes": (2.6, 16.5),
     "anisotropy": (1.0, 17.6),
 }
-WIDEST, SCAN = (
-    1.5,
-    400,
-)  # ends of the largest islands' band (27a); wavenumbers at which it is tried
+# ends of the largest islands' band (27a); wavenumbers at which it is tried
+WIDEST = 1.5
+SCAN = 400
 # largest deviation of ln C from one power law for which a spectrum counts as self-affine
 SAME_LAW = 0.01
 # ratio of wavenumbers in a sum of spectra, which deviates from power laws between them by
@@ -140,7 +139,8 @@ class SpectralSurface(AnySurface):
     nominal_area: dataclasses.InitVar[Any] = None
 
     def __post_init__(self, nominal_area: Any) -> None:
-        q, C = finite_array("q", self.q), finite_array("C", self.C)
+        q = finite_array("q", self.q)
+        C = finite_array("C", self.C)
         if q.ndim != 1 or q.shape != C.shape:
             raise InputError(
                 f"q and C must be two columns of one length, got shapes {q.shape} and {C.shape}"
@@ -183,7 +183,9 @@ class SpectralSurface(AnySurface):
                 "the spectrum's moments overflow or vanish: choose another length unit"
             )
         vars(self).update(unit=Units(self.unit).length)
-        heights, top, provenance = self.heights, self.h_max, tuple(self.provenance)
+        heights = self.heights
+        top = self.h_max
+        provenance = tuple(self.provenance)
         if nominal_area is not None:
             top, provenance = of_area(self, nominal_area, top)
             heights = None if heights is None or heights.is_gaussian else heights
@@ -235,7 +237,8 @@ class SpectralSurface(AnySurface):
     @functools.cached_property
     def hurst(self) -> float | None:
         """Hurst exponent of a spectrum that is one power law within a percent; None of any other."""
-        x, y = np.log(self.q), np.log(np.maximum(self.C, np.finfo(float).tiny))
+        x = np.log(self.q)
+        y = np.log(np.maximum(self.C, np.finfo(float).tiny))
         slope, level = np.polyfit(x, y, 1)
         exponent = -slope / 2 - 1
         straight = np.abs(y - level - slope * x).max() <= SAME_LAW
@@ -253,7 +256,8 @@ class SpectralSurface(AnySurface):
         MBMA's floors refer to it.
         """
         q = np.unique(np.append(self.q, np.geomspace(self.q0, self.q1, SCAN)))[:-1]
-        start, end = self.laws.place(q), self.laws.place(np.minimum(WIDEST * q, self.q1))
+        start = self.laws.place(q)
+        end = self.laws.place(np.minimum(WIDEST * q, self.q1))
         return float(q[self.laws.between(0, start, end).argmax()])
 
     def departures(self, by_map: bool = False) -> tuple[str, ...]:
@@ -304,7 +308,9 @@ class SpectralSurface(AnySurface):
 
     def resized(self, up: float, along: float) -> Self:
         """The surface with its heights `up` times as large, and its lengths along the plane `along` times."""
-        known, bands, whole = self.bearing, self.bands, self.map
+        known = self.bearing
+        bands = self.bands
+        whole = self.map
         if known is not None:
             moved = dict.fromkeys(("h_rms", "h_max", "quantiles", "mean_height"), up)
             moved |= dict.fromkeys(("gradient", "tension_force", "tension"), up / along)
@@ -353,16 +359,19 @@ class SpectralSurface(AnySurface):
             )
         if self.unit is not None:
             other = other.to(self.unit)
-        low, high = min(self.q0, other.q0), max(self.q1, other.q1)
+        low = min(self.q0, other.q0)
+        high = max(self.q1, other.q1)
         fine = np.geomspace(
             low, high, math.ceil(math.log(high / low) / math.log(FINE)) + 1
         )
         grid = np.unique(np.clip(np.concatenate([fine, self.q, other.q]), low, high))
         # both sides of every wavenumber, since the sum jumps at the ends of bands
         sides = np.stack([grid[:-1] * (1 + SIDE), grid[1:] * (1 - SIDE)], axis=1).ravel()
-        q, C = np.repeat(grid, 2)[1:-1], self.laws.at(sides) + other.laws.at(sides)
+        q = np.repeat(grid, 2)[1:-1]
+        C = self.laws.at(sides) + other.laws.at(sides)
         kept = np.append(True, (np.diff(q) > 0) | (np.abs(np.diff(C)) > 1e-9 * C[1:]))
-        told, stretch = [], None
+        told = []
+        stretch = None
         if self.bearing is not None or other.bearing is not None:
             told.append(
                 "curves of the maps' summits and valleys are not used: the relative position of the maps is not known"
@@ -400,7 +409,8 @@ class SpectralSurface(AnySurface):
         """The same measured surface, with a record of the influence of its shortest octave of wavelengths."""
         unit = f" {self.unit}" if self.unit else ""
         # the map may be sampled more finely than its shortest wavelength
-        shortest, sampled = self.shortest(NO_POWER), 2 * math.pi / float(self.q[-1])
+        shortest = self.shortest(NO_POWER)
+        sampled = 2 * math.pi / float(self.q[-1])
         before = float(
             self.laws.below(2, self.laws.place(np.asarray(math.pi / shortest)))
         )

@@ -131,7 +131,8 @@ class Surface(SelfAffine):
             )
         if np.ma.is_masked(C) and np.shape(q) == np.shape(C):
             shown = ~np.ma.getmaskarray(np.ma.asanyarray(C))
-            q, C = np.asarray(q)[shown], np.asarray(C)[shown]
+            q = np.asarray(q)[shown]
+            C = np.asarray(C)[shown]
         known = None if heights is None else Heights.of(heights)
         own = finite_array("C", C) * (
             1 / (4 * math.pi**2) if convention == "isotropic" else 1.0

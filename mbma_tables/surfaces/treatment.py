@@ -35,10 +35,9 @@ DETRENDS = (
 MIN_GRID = 32  # points along each side: 16 wavenumbers, the first of which is distorted by a window
 FREE_HOLES = 0.05  # share of undefined points that is filled without being requested
 MEDIAN_POINTS = 3  # side of the neighbourhood that an outlier is compared with
-USUAL, USUAL_DEVIATES = (
-    0.99,
-    2.576,
-)  # share of points that set the scale of differences, and where it ends if Gaussian
+# share of points that set the scale of differences, and where it ends if Gaussian
+USUAL = 0.99
+USUAL_DEVIATES = 2.576
 OVERLAP = (
     35 / 18
 )  # Fourier components along an axis under a Hann window that count as one independent component
@@ -46,14 +45,14 @@ MIN_POWER = (
     1e-24  # power over that of the strongest wavelength: lower values are rounding
 )
 FORM = 0.5  # share of the height variance in a tilt or a bow above which it is reported
-USUAL_LIMIT, FEW = (
-    10.0,
-    1e-3,
-)  # standard deviations of an outlier; share of points up to which they are reported
+# standard deviations of an outlier; share of points up to which they are reported
+USUAL_LIMIT = 10.0
+FEW = 1e-3
 # a spike differs this many times as much from the median of its neighbourhood as its
 # neighbours do but two, which may be spikes too: on 130 maps of machined surfaces one point
 # does, and also stands out by `USUAL_LIMIT`
-ISOLATED, OTHER_SPIKES = 4.0, 2
+ISOLATED = 4.0
+OTHER_SPIKES = 2
 # share of filled points above which results are not valid: with 0.2% of the points missing
 # at random, pressures at a gap change by up to 0.3%, and by 0.7 to 5% with 1 to 3% missing
 # in patches, more than the scatter of a simulation
@@ -61,7 +60,9 @@ MOST_FILLED = 1e-3
 # a line between two rows is a seam if the median step across it is this many times those beside it, and all but those
 # of so many seams, and as large as what the step varies by along the line: on 130 maps of machined surfaces, at most
 # 1.7 and 1.2 times; lines of scanning probes jump too, but many of them
-SEAM, SEAM_SPREAD, MOST_SEAMS = 2.5, 1.0, 3
+SEAM = 2.5
+SEAM_SPREAD = 1.0
+MOST_SEAMS = 3
 CALLED = {"long_cutoff": "a long cut-off", "short_cutoff": "a short cut-off"}
 CALLED |= {"s_filter": "an S-filter", "l_filter": "an L-filter"}
 GAUSSIAN = math.log(
@@ -160,7 +161,8 @@ class Treated:
 
     def history(self, *notes: Mapping[str, Any], more: str = "") -> Provenance:
         """All steps of a surface made of it: reading, treatment, what was done at the edges, and notes."""
-        shape, unit = self.heights.shape, f" {self.unit}" if self.unit else ""
+        shape = self.heights.shape
+        unit = f" {self.unit}" if self.unit else ""
         sides = " x ".join(
             f"{count * step:.4g}" for count, step in zip(shape, self.steps, strict=True)
         )
@@ -225,7 +227,8 @@ def treat(
 
 def _flattened(known: Treated, mode: str | None) -> Treated:
     """Heights less their trend."""
-    heights, trend = known.heights, mode or ("mean" if known.periodic else "plane")
+    heights = known.heights
+    trend = mode or ("mean" if known.periodic else "plane")
     degree = DEGREES.get(trend)
     if degree is None:
         flat = np.asarray(
@@ -236,7 +239,8 @@ def _flattened(known: Treated, mode: str | None) -> Treated:
     size = float(np.abs(heights).max())
     if not float(np.abs(flat).max()) > max(1e3 * np.finfo(float).eps * size, MIN_LENGTH):
         raise InputError(f"the map is flat: without its {trend} it is zero")
-    before, after = float(np.std(heights)), float(np.std(flat))
+    before = float(np.std(heights))
+    after = float(np.std(flat))
     told = f"{trend} subtracted" + (
         f": h_rms {before:.4g} before, {after:.4g} after" if trend != "mean" else ""
     )
@@ -275,7 +279,8 @@ def _without_outliers(known: Treated, asked: float | None) -> Treated:
     """Heights with outliers undefined; if not requested, a few outliers are only reported."""
     from scipy.ndimage import median_filter
 
-    heights, whole = known.heights, _harmonic(known)
+    heights = known.heights
+    whole = _harmonic(known)
     # far outliers distort the filling of their neighbours, not their median
     mode = "wrap" if known.periodic else "mirror"
     median = median_filter(whole, MEDIAN_POINTS, mode=mode)
@@ -369,7 +374,8 @@ def _without_seams(known: Treated) -> Treated:
 def _filled(known: Treated, fill: str | None) -> Treated:
     """Heights without undefined points."""
     heights = known.heights
-    size, count = heights.size, int(np.ma.getmaskarray(heights).sum())
+    size = heights.size
+    count = int(np.ma.getmaskarray(heights).sum())
     share = count / size
     if count == 0:
         return dataclasses.replace(known, heights=_harmonic(known))
@@ -401,7 +407,8 @@ def _filled(known: Treated, fill: str | None) -> Treated:
 
 def _within(known: Treated, treatment: Treatment) -> Treated:
     """Heights whose wavelengths lie between both cut-offs, or filters."""
-    long, short = treatment.long_cutoff, treatment.short_cutoff
+    long = treatment.long_cutoff
+    short = treatment.short_cutoff
     if short is not None and not short > 2 * min(known.steps):
         raise InputError(
             f"short_cutoff must be longer than two sampling steps, {2 * min(known.steps):.4g}, the shortest wavelength "
@@ -484,7 +491,8 @@ def filtered(
     values: FloatArray, steps: tuple[float, ...], name: str, wavelength: float
 ) -> FloatArray:
     """Periodic heights after a cut-off or a filter, an option of `Treatment`, at a wavelength."""
-    q2, cut = _squared_waves(values.shape, steps), (2 * math.pi / wavelength) ** 2
+    q2 = _squared_waves(values.shape, steps)
+    cut = (2 * math.pi / wavelength) ** 2
     if name == "short_cutoff":
         left = q2 <= cut * (1 + 1e-12)
     elif name == "long_cutoff":

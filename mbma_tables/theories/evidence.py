@@ -20,10 +20,9 @@ COMPARED = (
     5e-4,
     0.98,
 )  # A/A0 of the lightest and the heaviest contacts whose errors were averaged
-FEW, MIN_SHARED = (
-    64,
-    40,
-)  # most surfaces, and least entries per surface, for which polynomials are made
+# most surfaces, and least entries per surface, for which polynomials are made
+FEW = 64
+MIN_SHARED = 40
 
 Owners = NDArray[np.int64]
 

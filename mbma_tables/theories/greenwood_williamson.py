@@ -34,11 +34,9 @@ class GreenwoodWilliamson(Theory):
     ends_at_h_max = False
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
-        density, radius, sigma = (
-            surface.summit_density,
-            surface.summit_radius,
-            surface.summit_sigma,
-        )
+        density = surface.summit_density
+        radius = surface.summit_radius
+        sigma = surface.summit_sigma
         x = (2 * np.asarray(mean_separation) - np.asarray(surface.h_max)) / sigma
         strength = density * np.sqrt(radius * sigma)
         pressure = 4 / 3 * strength * sigma * height_integral(1.5, x)

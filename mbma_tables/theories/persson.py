@@ -136,7 +136,8 @@ class Persson(Theory):
             allowed,
             "zero or positive, and positive for the full form",
         )
-        h_rms, gradient = np.asarray(surface.h_rms), np.asarray(surface.rms_gradient)
+        h_rms = np.asarray(surface.h_rms)
+        gradient = np.asarray(surface.rms_gradient)
         pressure, _, stiffness = self._by_law(surface, "contact", u / h_rms)
         normal = np.isfinite(stiffness) & (pressure >= LEAST)
         require(

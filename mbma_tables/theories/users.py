@@ -82,10 +82,8 @@ class Wrapped(Theory):
                 self._theory.answer(select(surface, u.shape, place), x)[0], x.shape
             )
 
-        place, step = (
-            np.arange(float(u.size)).reshape(u.shape),
-            0.01 * np.asarray(surface.h_rms),
-        )
+        place = np.arange(float(u.size)).reshape(u.shape)
+        step = 0.01 * np.asarray(surface.h_rms)
         known = {"order": 4, "initial_step": step, "tolerances": {"rtol": ENOUGH}}
         slope = derivative(force, u, args=(place,), **known).df
         return TheoryAnswer(pressure, area, -slope, np.full(u.shape, np.nan))

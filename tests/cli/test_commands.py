@@ -37,7 +37,9 @@ def folder(tmp_path, monkeypatch):
 
 def refused(*arguments: str) -> str:
     """What a refusal says; it must be short, and must leave the folder as it was."""
-    before, said, after = contents(), helpers.refused(*arguments), contents()
+    before = contents()
+    said = helpers.refused(*arguments)
+    after = contents()
     assert after == before
     return said
 
@@ -230,7 +232,8 @@ def test_a_curve_and_its_picture_beside_other_theories(folder):
         "mbma",
     )
     found = json.loads(run("curve", *arguments, "--json"))["columns"]
-    surface, area = Surface.named("concrete"), np.array(found["area"])
+    surface = Surface.named("concrete")
+    area = np.array(found["area"])
     known = contact(surface, 3.0, separation=found["separation"])
     np.testing.assert_array_equal(found["pressure"], known.pressure)
     assert (found["separation"][0], found["separation"][-1]) == (

@@ -12,7 +12,8 @@ from mbma_tables.contacts.measurement import table_of_loads
 from mbma_tables.scenes.specimen import read_specimen
 
 library = topographies()
-POINTS, STEP = 64, 0.5
+POINTS = 64
+STEP = 0.5
 MAP = "docs/data/maps/top-1.top"
 
 

@@ -98,7 +98,8 @@ def test_scatter_of_stiffness_and_separation():
     )
     # what was stated for stiffness at equal force, in the middle of a bin
     with netCDF4.Dataset(shipped_file("calibrated.nc")) as data:
-        theories, middle = data.theories.split(), float(data["contact"][3])
+        theories = data.theories.split()
+        middle = float(data["contact"][3])
         row = data["stated_scatter"][:, data.quantities.split().index("stiffness"), 3]
     for theory in ("calibrated", "mbma", "persson"):
         stated = contact(SURFACE, area=middle, theory=theory).stiffness_scatter
@@ -118,7 +119,8 @@ def test_conductance_is_per_unit_of_length_and_in_SI_of_texts():
             conducting = dataclasses.replace(bodies, conductivity=conductivity)
             return contact(face, conducting, pressure=pressure, theory="calibrated")
 
-        plain, thermal = pressed((45.0, 167.0)), pressed(texts)
+        plain = pressed((45.0, 167.0))
+        thermal = pressed(texts)
         stiffness = np.asarray(plain.unloading_stiffness) / modulus
         assert plain.conductance == pytest.approx(k_s * stiffness, rel=1e-14)
         assert thermal.conductance == pytest.approx(1e6 * k_s * stiffness, rel=1e-14)
@@ -276,7 +278,8 @@ def test_units_of_lists_and_of_named_arrays():
 
 @pytest.mark.parametrize("cap", [0.03, np.inf])
 def test_forces_that_no_gap_resolves_are_refused(cap):
-    surface, bodies = Surface(0.8, 0.01, 2.0, 1.0, 3.0), Bodies(hardness=cap)
+    surface = Surface(0.8, 0.01, 2.0, 1.0, 3.0)
+    bodies = Bodies(hardness=cap)
     pressures = [1e-150, 1e-3]
     # lighter than what is left where h_max - u is rounding
     with pytest.raises(
@@ -414,10 +417,8 @@ class Tasks(Callback):
 
 def test_dimensions_by_name():
     gaps = gaps_over(7, attrs={"units": "mm", "long_name": "separation"})
-    found, h_max = (
-        contact(surfaces_over(), separation=gaps),
-        np.array([3.0, 3.2])[:, None],
-    )
+    found = contact(surfaces_over(), separation=gaps)
+    h_max = np.array([3.0, 3.2])[:, None]
     plain = contact(
         Surface(np.array([0.4, 0.7, 1.0])[:, None, None], 0.2, 40.0, 1.0, h_max),
         separation=gaps.values,
@@ -449,7 +450,8 @@ def test_dimensions_by_name():
 
 @pytest.mark.parametrize("scheduler", ["synchronous", "threads"])
 def test_dask_is_lazy_and_gives_the_same_answers(scheduler):
-    gaps, surfaces = gaps_over(50), surfaces_over()
+    gaps = gaps_over(50)
+    surfaces = surfaces_over()
     eager = contact(surfaces, separation=gaps)
     lazy_surfaces = Surface(
         surfaces.hurst.chunk(surface=2), 0.2, 40.0, 1.0, surfaces.h_max.chunk(case=1)
@@ -481,11 +483,10 @@ def test_dask_is_lazy_and_gives_the_same_answers(scheduler):
 
 
 def test_the_bits_of_one_surface_depend_neither_on_the_kind_of_argument_nor_on_the_chunks():
-    surface, gaps = SMOOTH, gaps_over(5000)
-    eager, plain = (
-        contact(surface, separation=gaps),
-        contact(surface, separation=gaps.values),
-    )
+    surface = SMOOTH
+    gaps = gaps_over(5000)
+    eager = contact(surface, separation=gaps)
+    plain = contact(surface, separation=gaps.values)
     assert plain.islands < 5000  # one series for all gaps
     for k in (0, 17, 2500, 4999):
         one = contact(surface, separation=float(gaps[k]))
@@ -548,10 +549,8 @@ test_labelled_arguments_that_are_refused = refusals(
 
 
 def test_options_go_through():
-    gaps, surfaces = (
-        gaps_over(3),
-        Surface(xr.DataArray([0.05, 0.8], dims="s"), 0.2, 0.2e8, 1.0, 3.0),
-    )
+    gaps = gaps_over(3)
+    surfaces = Surface(xr.DataArray([0.05, 0.8], dims="s"), 0.2, 0.2e8, 1.0, 3.0)
     found = contact(surfaces, separation=gaps, theory=Mbma(outside="nan")).pressure
     assert np.isnan(found.transpose("s", "gap")).values.tolist() == [
         [True, True, False],

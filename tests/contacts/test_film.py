@@ -48,7 +48,9 @@ def test_published_curves(gamma):
 
 
 def test_reynolds_on_a_stretched_surface_that_no_fit_saw():
-    rng, n, lay = np.random.default_rng(5), 256, 3.0
+    rng = np.random.default_rng(5)
+    n = 256
+    lay = 3.0
     q = np.meshgrid(*2 * [np.fft.fftfreq(n)], indexing="ij")
     length = np.hypot(q[0] * lay, q[1])
     amplitude = np.where(
@@ -129,7 +131,8 @@ def test_factors_of_a_simulated_map_are_those_of_its_gaps(own_map):
         gap = u - z if u > z.max() else found.map().gap
         assert gap.mean() == pytest.approx(u, rel=0.01)
         K, couette = flow_and_couette(gap, gap.shape)
-        phi, shear = [film.phi_x[k], film.phi_y[k]], [film.shear_x[k], film.shear_y[k]]
+        phi = [film.phi_x[k], film.phi_y[k]]
+        shear = [film.shear_x[k], film.shear_y[k]]
         deep = found.area > 0.05
         np.testing.assert_allclose(phi, K / gap.mean() ** 3, rtol=0.2 if deep else 0.02)
         np.testing.assert_allclose(shear, gap.mean() - couette, rtol=0.02)

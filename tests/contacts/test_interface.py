@@ -26,7 +26,9 @@ from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.simulated.boundary_elements import Contact
 
 FACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
-RADIUS, FRICTION, NU = 5.0, 0.3, 0.25
+RADIUS = 5.0
+FRICTION = 0.3
+NU = 0.25
 
 
 class Spheres:
@@ -47,8 +49,10 @@ def sheared(u=2.5):
 
 def test_spheres_are_those_of_cattaneo_mindlin_and_deresiewicz():
     """K. L. Johnson, Contact Mechanics, Eqs. (7.42), (7.44) and (7.57), for two bodies alike."""
-    depth, modulus = 0.5, 1e3
-    found, a = sheared(3.0 - depth), np.sqrt(RADIUS * depth)
+    depth = 0.5
+    modulus = 1e3
+    found = sheared(3.0 - depth)
+    a = np.sqrt(RADIUS * depth)
     G = modulus * (1 - NU)  # 1/E* = 2 (1 - nu^2)/E = (1 - nu)/G
     compliance = 2 * (2 - NU) / G
     load = 4 / 3 * modulus * np.sqrt(RADIUS) * depth**1.5
@@ -178,11 +182,9 @@ def test_two_bodies_add_their_compliances():
 
 def test_what_is_refused():
     bodies = Bodies(nu=NU)
-    found, apart, law = (
-        sheared(),
-        contact(FACE, bodies, mean_separation=2.5, theory=Spheres()),
-        contact_law(FACE, bodies, theory="calibrated"),
-    )
+    found = sheared()
+    apart = contact(FACE, bodies, mean_separation=2.5, theory=Spheres())
+    law = contact_law(FACE, bodies, theory="calibrated")
     cases = [
         (ask, (-0.1,), "at least 0")
         for ask in (found.shear, found.displacement, found.energy_loss)
@@ -252,13 +254,12 @@ def test_gaps_of_boundary_elements(hurst, seed, eta):
     recipe = Recipe("self_affine", hurst, 6, 4, seed, 128)
     z = heights(recipe)
     slope = np.hypot(*np.gradient(z, 1 / 128)).std()
-    solved, jumps = (
-        Contact(z / slope, recipe.sizes, hardness=eta),
-        np.array([0.3, 1.0, 3.0]),
-    )
+    solved = Contact(z / slope, recipe.sizes, hardness=eta)
+    jumps = np.array([0.3, 1.0, 3.0])
     for area in (0.01, 0.05, 0.2):
         solved.press(load_at(area, eta))
-        gap, open_ = solved.gap * slope, solved.pressure <= 0
+        gap = solved.gap * slope
+        open_ = solved.pressure <= 0
         measured = np.array([(open_ / (gap + jump)).mean() for jump in jumps])
         law = mean_inverse(gap.mean(), 1 - open_.mean(), jumps, 1.0, eta)
         assert (np.abs(law / measured - 1) < [0.08, 0.04, 0.02]).all()
@@ -291,7 +292,8 @@ def test_limits():
 )
 def test_at_low_pressure_molecules_fly_from_face_to_face(gas, mass, gamma, share):
     """Free molecular conduction between parallel plates (Kennard 1938), without conductivity, viscosity and gap."""
-    T, P = np.array([250.0, 300.0, 550.0]), 10.0
+    T = np.array([250.0, 300.0, 550.0])
+    P = 10.0
     k, jump = jump_of(gas, T, P)
     free = (
         share

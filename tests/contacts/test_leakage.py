@@ -152,10 +152,8 @@ class TestRates:
 
 
 def open_gaps(law, shares):
-    low, high = (
-        max(2 * law.leakage.blocked_at - law.h_max, law.lowest),
-        min(law.h_max, law.highest),
-    )
+    low = max(2 * law.leakage.blocked_at - law.h_max, law.lowest)
+    high = min(law.h_max, law.highest)
     return low + (high - low) * shares
 
 
@@ -185,10 +183,8 @@ class TestLaw:
         d = open_gaps(
             law, np.append(rng.uniform(1e-4, 1, 100), 10 ** rng.uniform(-4, 0, 100))
         )
-        found, expected = (
-            law.leakage(separation=d),
-            contact(surface, separation=d, theory=theory).leakage.K,
-        )
+        found = law.leakage(separation=d)
+        expected = contact(surface, separation=d, theory=theory).leakage.K
         np.testing.assert_allclose(found, expected, rtol=law.leakage.error + 2e-5)
         assert law.leakage.error < 2e-4
         np.testing.assert_allclose(law.leakage((d + law.h_max) / 2), found, rtol=1e-9)
@@ -257,10 +253,8 @@ class TestLaw:
         rng = np.random.default_rng(len(theory))
         for batch in range(count):
             hurst, zeta_1, h_max, part = rng.uniform((0.1, 3.1, 2.6, -8), (1, 300, 5, -3))
-            rtol, d = (
-                10**part,
-                np.append(rng.uniform(0, 1, 1000), 10 ** rng.uniform(-6, 0, 1000)),
-            )
+            rtol = 10**part
+            d = np.append(rng.uniform(0, 1, 1000), 10 ** rng.uniform(-6, 0, 1000))
             assert (
                 over_bound(
                     contact_law(
@@ -302,7 +296,8 @@ def test_reference_data_of_another_campaign():
         & (data["ky"] > 1e-10)
         & (data["area"] < 0.3)
     )
-    data, one = data[kept], np.ones(kept.sum())
+    data = data[kept]
+    one = np.ones(kept.sum())
     surface = Surface(data["hurst"], one, data["zeta_1"], one, data["h_max_over_h_rms"])
     found = contact(
         surface, pressure=data["force"] * surface.rms_gradient, theory="calibrated"
@@ -317,16 +312,12 @@ def test_reference_data_of_another_campaign():
 
 def test_rates_of_named_arrays_keep_their_dimensions_and_units():
     seal = Surface(hurst=0.8, q0=0.01, q1=0.5, h_rms=1.0, h_max=3.5, unit="um")
-    gaps, width = (
-        xr.DataArray([1.9, 2.0], dims="gap"),
-        xr.DataArray([2.0, 3.0, 4.0], dims="width"),
-    )
+    gaps = xr.DataArray([1.9, 2.0], dims="gap")
+    width = xr.DataArray([2.0, 3.0, 4.0], dims="width")
     named = asked(seal, "10 MPa", mean_separation=gaps)
     plain = asked(seal, "10 MPa", mean_separation=gaps.values[:, None])
-    found, expected = (
-        named.liquid("1e-3 Pa s", "0.1 MPa", width),
-        plain.liquid("1e-3 Pa s", "0.1 MPa", width.values),
-    )
+    found = named.liquid("1e-3 Pa s", "0.1 MPa", width)
+    expected = plain.liquid("1e-3 Pa s", "0.1 MPa", width.values)
     assert found.dims == ("gap", "width")
     assert found.values == pytest.approx(expected)
     assert plain.liquid(

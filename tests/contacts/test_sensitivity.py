@@ -41,7 +41,8 @@ AT_KINKS = [
 
 def differences(numbers, variant, step, names):
     """Derivatives of force and area by high-order differences of exact islands, of shape (2, names)."""
-    shifted, spans = [], []
+    shifted = []
+    spans = []
     for name in names:
         place = NAMES.index(name)
         backward = name == "hurst" and numbers[place] == 1
@@ -118,7 +119,8 @@ def test_sensitivity_against_differences(case, variant):
 
 
 def test_units_shapes_and_no_contact():
-    surface, gap = Surface([[0.5], [1.0]], 0.3, 30.0, 0.7, 2.4), np.array([1.0, 2.4, 5.0])
+    surface = Surface([[0.5], [1.0]], 0.3, 30.0, 0.7, 2.4)
+    gap = np.array([1.0, 2.4, 5.0])
     found, stiff = (
         contact(surface, e, separation=gap).stiffness for e in (1.0, [2.0, 3.0, 4.0])
     )
@@ -287,7 +289,8 @@ def simulated_anew(heights, spacing, modulus="30 GPa", pressure="0.1 GPa"):
 @pytest.mark.slow
 def test_a_map_answers_by_the_theory_that_contact_takes():
     """Maps with larger heights and lengths, simulated each, have the differences that the rows give."""
-    heights, step = 0.1 * random_map(64, 0.03, 0.2, power=0), 0.01
+    heights = 0.1 * random_map(64, 0.03, 0.2, power=0)
+    step = 0.01
     surface = Surface.from_map(heights, 1.0, periodic=True, unit="um")
     slopes = sensitivity(surface, "30 GPa", pressure="0.1 GPa", theory="simulated").slopes
     rows = {

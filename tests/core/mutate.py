@@ -209,10 +209,8 @@ def ask_law(block, gap, gaps):
 
 
 if __name__ == "__main__":
-    recorded, together = (
-        pickle.loads(pathlib.Path(sys.argv[1]).read_bytes()),
-        int(sys.argv[2]),
-    )
+    recorded = pickle.loads(pathlib.Path(sys.argv[1]).read_bytes())
+    together = int(sys.argv[2])
     called = {**dict(functions()), "Law": ask_law}
     counts = {name: [] for name in called}
     for call in [call for call in recorded if call.name == "law_fill"]:

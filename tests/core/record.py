@@ -98,7 +98,8 @@ def use():
     core.island_extents(np.array([2.0]), np.array([0.5]), 3e-8, np.empty(1))
 
     universal = open_table("universal")
-    X, mu = np.linspace(-5, 40, 300), np.geomspace(1e-6, 1e5, 300)
+    X = np.linspace(-5, 40, 300)
+    mu = np.geomspace(1e-6, 1e5, 300)
     universal.answer(X, mu)
     greenwood_tripp.rigid_sphere(X, mu)
     greenwood_tripp.solve(X[50:250:10], mu[50:250:10]).pressure.sum()
@@ -106,7 +107,8 @@ def use():
     many = Surface(np.linspace(0.3, 1.0, 40), 0.2, np.geomspace(0.7, 4000, 40), 1.0, 3.0)
     assert contact(one, separation=[0.5, 1.0]).stiffness.all()
     contact(many, separation=np.linspace(-2, 2.9, 40), theory=Mbma(rtol=1e-6))
-    law, gaps = contact_law(one, theory="mbma"), np.linspace(-2.9, 2.9, 100)
+    law = contact_law(one, theory="mbma")
+    gaps = np.linspace(-2.9, 2.9, 100)
     for quantity in (law.pressure, law.area, law.stiffness, law.area_slope, law.energy):
         quantity(separation=0.5)
         quantity(separation=np.linspace(-2.9, 2.9, 2000))

@@ -32,7 +32,8 @@ def wrong(given, changed):
 
 
 if __name__ == "__main__":
-    known, first = dict(functions()), {}
+    known = dict(functions())
+    first = {}
     for call in recorded(use):
         first.setdefault(call.name, (call.given, call.after))
     refused = 0

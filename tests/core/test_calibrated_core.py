@@ -27,7 +27,8 @@ PLAIN = importlib.import_module("mbma_tables.core._plain")
 FUSED = [importlib.import_module(f"mbma_tables.core._{name}") for name, least in GENERATIONS.items()
          if name != "plain" and PLAIN.generation >= least]  # fmt: skip
 CORES = [PLAIN, *FUSED]
-TABLE, FLOW = shipped(), shipped_flow()
+TABLE = shipped()
+FLOW = shipped_flow()
 BAD = [math.nan, math.inf, -math.inf, 5e-324, -5e-324, 1e308, -1e308, 0.0, -0.0, -1.0]
 
 
@@ -44,7 +45,8 @@ def batch(n, seed=0, top=12.0):
 
 
 def fill(rows, owner, u, used=core, pieces=None):
-    ends, out = np.empty((rows.shape[1], 2)), np.empty((3, u.size))
+    ends = np.empty((rows.shape[1], 2))
+    out = np.empty((3, u.size))
     used.calibrated_ends(*TABLE.core_table, *rows, None, None, ends)
     given = *TABLE.core_table, *rows, ends, pieces
     bad = used.calibrated_contact(*given, owner, u, *out)
@@ -53,7 +55,8 @@ def fill(rows, owner, u, used=core, pieces=None):
 
 
 def separations(rows, owner, force, used=core, pieces=None):
-    ends, out = np.empty((rows.shape[1], 2)), np.empty(force.size)
+    ends = np.empty((rows.shape[1], 2))
+    out = np.empty(force.size)
     used.calibrated_ends(*TABLE.core_table, *rows, None, None, ends)
     bad = used.calibrated_separation(
         *TABLE.core_table, *rows, ends, pieces, owner, force, out
@@ -118,13 +121,12 @@ class TestBits:
         everyone = np.arange(400)
         out = fill(rows, everyone, u)
         force = np.where(out[0] > 0, np.minimum(out[0], 1e3), 1e-3)
-        gaps, area = (
-            separations(rows, everyone, force),
-            np.random.default_rng(1).uniform(0, 0.5, 400),
-        )
+        gaps = separations(rows, everyone, force)
+        area = np.random.default_rng(1).uniform(0, 0.5, 400)
         k = flow(rows, everyone, u, area)
         mixed = np.random.default_rng(2).permutation(np.tile(everyone, 3))
-        pieces, own = pieces_of(TABLE, rows), pieces_of(FLOW, rows)
+        pieces = pieces_of(TABLE, rows)
+        own = pieces_of(FLOW, rows)
         for made, made_flow in ((None, None), (pieces, own)):
             np.testing.assert_array_equal(
                 fill(rows, mixed, u[mixed], pieces=made), out[:, mixed]
@@ -136,7 +138,8 @@ class TestBits:
                 flow(rows, mixed, u[mixed], area[mixed], pieces=made_flow), k[mixed]
             )
         for n in range(0, 400, 7):
-            one, first = np.ascontiguousarray(rows[:, n : n + 1]), np.zeros(1, np.int64)
+            one = np.ascontiguousarray(rows[:, n : n + 1])
+            first = np.zeros(1, np.int64)
             np.testing.assert_array_equal(fill(one, first, u[n : n + 1])[:, 0], out[:, n])
             np.testing.assert_array_equal(
                 separations(one, first, force[n : n + 1])[0], gaps[n]
@@ -179,10 +182,8 @@ class TestAnyInput:
         for row in range(3):
             rows[row, row * len(BAD) : (row + 1) * len(BAD)] = BAD
         everyone = np.arange(u.size)
-        out, inside = (
-            fill(rows, everyone, np.full(u.size, 0.5), used),
-            TABLE.covers(*rows[:2]) & (rows[2] >= 1e-300),
-        )
+        out = fill(rows, everyone, np.full(u.size, 0.5), used)
+        inside = TABLE.covers(*rows[:2]) & (rows[2] >= 1e-300)
         assert np.isfinite(out).all(axis=0).tolist() == inside.tolist()
         assert inside.sum() == 2  # h_max of infinity and 1e308
         assert (
@@ -199,7 +200,8 @@ class TestAnyInput:
                 separations(rows, wrong, np.full(5, 0.1), used, pieces),
             )
             assert (np.isfinite(found) == [*[False] * 4, True]).all()
-        nobody, half = np.empty((3, 0)), np.full(5, 0.5)
+        nobody = np.empty((3, 0))
+        half = np.full(5, 0.5)
         for ask in (fill, separations):
             with pytest.raises(ValueError, match="sizes"):
                 ask(nobody, wrong, half, used)
@@ -212,7 +214,8 @@ class TestAnyInput:
     [(0.1, 1.1), (0.37, 5.0), (1.0, 11.5), (1e-9, 2.0), (1 - 1e-12, 3.0)],
 )
 def test_moments_of_self_affine_surfaces(hurst, log_zeta_1):
-    alpha, gradient = np.empty(1), np.empty(1)
+    alpha = np.empty(1)
+    gradient = np.empty(1)
     assert (
         core.self_affine(np.array([hurst]), np.array([log_zeta_1]), alpha, gradient) == 0
     )
@@ -249,11 +252,13 @@ def gauss(low, high):
 
 def inner(y, weights):
     """I(y) exp(2 y^2): over v = 2 (y'^2 - y^2); a logarithm of small y."""
-    light, y = np.log(np.maximum(1e-6 / y, 1)), np.maximum(y, 1e-6)
+    light = np.log(np.maximum(1e-6 / y, 1))
+    y = np.maximum(y, 1e-6)
     v, d_v = gauss(
         *(np.append(0.0, np.geomspace(1e-16, 45, 50))[k : k + 50] for k in (0, 1))
     )
-    v, d_v = v.ravel(), d_v.ravel()
+    v = v.ravel()
+    d_v = d_v.ravel()
     square = y[..., None] ** 2 + v / 2
     P = erf(np.sqrt(2 * square))
     slope = weights[0] + 3 * weights[1] * P**2 + 16 * weights[2] * P**15
@@ -265,7 +270,8 @@ def inner(y, weights):
 def log_separation(q, C, force, law):
     """ln u + 2 F^2 of power laws between samples, by panels graded towards both ends."""
     log_q = np.log(q / q[0])
-    last, first = log_q[-1], min(log_q[-1], 1.0)
+    last = log_q[-1]
+    first = min(log_q[-1], 1.0)
     graded = (
         np.append(0.0, first * np.exp(np.arange(-60, 0.5, 1.0))),
         last - first * 0.5 ** np.arange(13),
@@ -275,14 +281,16 @@ def log_separation(q, C, force, law):
         np.concatenate([log_q, *graded, *fine, np.arange(first, last, 0.5)])
     )
     root, d_root = gauss(np.sqrt(edges[:-1]), np.sqrt(edges[1:]))
-    t, d_t = root**2, 2 * root * d_root
+    t = root**2
+    d_t = 2 * root * d_root
 
     def content(order, x):
         return np.exp(np.interp(x, log_q, np.log(C)) + (order + 2) * x)
 
     inside, weight = gauss(np.broadcast_to(edges[:-1, None], t.shape), t)
     before = np.append(0, np.cumsum((content(2, t) * d_t).sum(axis=1)))
-    m0, m2 = (content(0, t) * d_t).sum(), before[-1]
+    m0 = (content(0, t) * d_t).sum()
+    m2 = before[-1]
     below = (before[:-1, None] + (content(2, inside) * weight).sum(axis=2)) / m2
     share = (
         np.exp(t) * content(0, t) * d_t / m0 / (4 * math.sqrt(m2 / m0) * np.sqrt(below))
@@ -333,7 +341,8 @@ class TestCurve:
         random = np.random.default_rng(samples)
         q = np.sort(np.exp(random.uniform(0, 6, samples)))
         C = np.minimum(1, q**-3.5) * np.exp(random.normal(0, scatter, samples))
-        law, force = Law(Spectrum.from_samples(q, C)), np.array([1e-9, 0.03, 1.5])
+        law = Law(Spectrum.from_samples(q, C))
+        force = np.array([1e-9, 0.03, 1.5])
         found = np.log(law.separation_persson(force)[0]) + 2 * force**2
         np.testing.assert_allclose(
             found, log_separation(q, C, force, law), rtol=0, atol=LAW_ERROR / 30

@@ -58,7 +58,8 @@ def test_a_table_whose_places_are_no_cells_of_it_is_refused():
     """Looked up once a call: places that begin or lie outside, and ranges with more strips or buckets than places."""
     cells, places, numbers = open_table("universal").cells
     assert lookup(cells, places, numbers)[0] == pytest.approx(0.0051784366, abs=1e-10)
-    strips, record = int((numbers[1] - numbers[0]) * numbers[2]) + 1, 136
+    strips = int((numbers[1] - numbers[0]) * numbers[2]) + 1
+    record = 136
     for place, number in (
         (0, -1),
         (0, strips - 1),
@@ -87,7 +88,9 @@ def test_a_table_whose_places_are_no_cells_of_it_is_refused():
 def test_rules_of_panels_with_other_numbers_of_nodes_and_gaps_are_refused(word, number):
     rules = RULES.copy()
     rules[word] = number
-    ends, fields, error = np.array([0.1]), np.ones((4, 1, 19)), np.empty(1)
+    ends = np.array([0.1])
+    fields = np.ones((4, 1, 19))
+    error = np.empty(1)
     given = np.array([1]), ends, 2 * ends, fields, 2, 1.0, error
     assert core.profile_missed(RULES, *given) == 0
     with pytest.raises(ValueError, match="profile_missed, or numbers of items in them"):

@@ -197,19 +197,17 @@ def answers(calls, *command):
     given = b"".join(call.packed() for call in calls)
     done = subprocess.run(command, input=given, capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
-    said, bits, worst = memoryview(done.stdout), {}, {}
+    said = memoryview(done.stdout)
+    bits = {}
+    worst = {}
     for call in calls:
         (returned,), said = np.frombuffer(said[:8], np.int64), said[8:]
-        parts, far = (
-            [int(returned).to_bytes(8, "little", signed=True)],
-            [0.0 if returned == call.returned else np.inf],
-        )
+        parts = [int(returned).to_bytes(8, "little", signed=True)]
+        far = [0.0 if returned == call.returned else np.inf]
         for one in call.after:
             if isinstance(one, np.ndarray):
-                found, said = (
-                    np.frombuffer(said[: one.nbytes], one.dtype),
-                    said[one.nbytes :],
-                )
+                found = np.frombuffer(said[: one.nbytes], one.dtype)
+                said = said[one.nbytes :]
                 far.append(off(found, one.ravel()))
                 # every NaN is one, as processors differ in its sign
                 parts.append(
@@ -226,7 +224,8 @@ def answers(calls, *command):
 @pytest.mark.slow
 def test_answers_of_other_processors(tmp_path, record_property):
     """Roundings depend on fma alone, and on the C library where a function calls it."""
-    compiler, seen = [found("cc")], {}
+    compiler = [found("cc")]
+    seen = {}
     calls = pickle.loads(recording(tmp_path).read_bytes())
     for generation in GENERATIONS:
         if generation == "_plain" or getattr(core, "generation", 0) >= int(

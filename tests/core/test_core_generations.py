@@ -67,7 +67,8 @@ def test_under_sanitizers(tmp_path):
     )
     for name in ("docs", "tables"):
         (tmp_path / name).symlink_to(ROOT / name)
-    include, cc = f"-I{sysconfig.get_path('include')}", found("cc")
+    include = f"-I{sysconfig.get_path('include')}"
+    cc = found("cc")
     options = [
         *BUILD.FLAGS,
         *SANITIZERS,
@@ -99,7 +100,8 @@ def test_under_sanitizers(tmp_path):
     )  # fmt: skip
     assert said.startswith(str(package))
     passed(QUICK, PYTHONPATH=paths, **sanitizer)
-    calls, script = recording(tmp_path), ROOT / "tests" / "core" / "mutate.py"
+    calls = recording(tmp_path)
+    script = ROOT / "tests" / "core" / "mutate.py"
     exact = {"PYTHONMALLOC": "malloc", "PYTHONPATH": paths}
     tried = json.loads(
         run(

@@ -22,8 +22,11 @@ PLAIN = (
     "modelica",
 )  # of rows of pressure alone
 POINTS = 10_000
-VALUES, TANGENTS = 1e-13, 1e-11  # what agreement is asked of exported laws
-CONDUCTIVITY, KAPPA = 3.0, 1.25
+# what agreement is asked of exported laws
+VALUES = 1e-13
+TANGENTS = 1e-11
+CONDUCTIVITY = 3.0
+KAPPA = 1.25
 # h_max is a dyadic number, so that c = (h_max - d)/2 is exact
 ROAD = Surface(0.8, 0.01, 2.0, 1.0, 3.0, unit="mm")
 ASKED = {
@@ -80,7 +83,8 @@ class Points:
     def assert_inverse(self, c):
         """Overclosures at `pressures`: where the library has them, but for what pressure there leaves open."""
         wanted = self.pressures()
-        d, back = self.law.h_max - 2 * np.asarray(c), self.law.separation(pressure=wanted)
+        d = self.law.h_max - 2 * np.asarray(c)
+        back = self.law.separation(pressure=wanted)
         assert (
             np.abs(np.asarray(self.law.pressure(separation=d)) / wanted - 1).max()
             <= 1e-12
@@ -96,7 +100,8 @@ class Points:
 def points(name):
     surface, options = ASKED[name]
     law = law_of_names(surface, "13.3 MPa", **options)
-    h, rng = law.h_max, np.random.default_rng(18)
+    h = law.h_max
+    rng = np.random.default_rng(18)
     ends = math.isinf(law.highest)
     near = h - 2 * h * 10 ** rng.uniform(-12, -0.6, POINTS // 2)
     grid = 2.0**-30

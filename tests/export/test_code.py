@@ -26,7 +26,8 @@ from mbma_tables.theories.mbma.tables import universal_model
 from mbma_tables.theories.mbma.universal import UniversalModel
 from mbma_tables.theories.mbma.variants import Variant, get_variant
 
-POINTS, SURFACES = 10_000, 60
+POINTS = 10_000
+SURFACES = 60
 SHARES = (1e-4, 0.01, 0.2, 0.5, 0.9, 0.99)  # u/h_max
 DEPTHS = (1.9, 0.9, 0.4, 0.03)  # (h_max - d)/h_max
 TOLERANCES = {"phi": 1e-13, "geometry": 1e-13, "total": 1e-13, "formula": 1e-13}
@@ -38,7 +39,8 @@ SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 def random_islands():
     """X and mu over the table, then over the closed form's range, with the ends of both."""
-    rng, found = np.random.default_rng(2008), []
+    rng = np.random.default_rng(2008)
+    found = []
     (X, mu), form = universal_model().content.axes, RANGES[conformance.FORM]
     for low, high, least, most in (
         (X.low, X.high, 1e-10, mu.high),
@@ -57,7 +59,8 @@ def random_islands():
 @functools.cache
 def many_points(variant="reported"):
     """A points' file; some surfaces have hurst = 1, where powers vanish, and some the calibrated table lacks."""
-    model, rng = universal_model(), np.random.default_rng(48)
+    model = universal_model()
+    rng = np.random.default_rng(48)
     islands = random_islands()
     lines = [
         *conformance.rows("phi", islands, model.answer(*islands)),
@@ -311,7 +314,8 @@ def test_no_answer_has_a_status_and_nan(c_folder, tmp_path):
         )
 
     good = (0.8, 1.0, 100.0, 1.0, 3.0, 1.0, 1.0, 1e-8)
-    nan, inf = math.nan, math.inf
+    nan = math.nan
+    inf = math.inf
     wrong = [
         (0, nan),
         (0, 1.1),

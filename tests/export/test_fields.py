@@ -32,10 +32,15 @@ def rows_of(**changed):
 
 def pressed(numbers, u, E_star):
     """MBDyn's `GreenwoodTrippCM::ContactPressureTpl`, in the words of its source."""
-    sigma, eta, beta = numbers["sigma"], numbers["eta"], numbers["beta"]
+    sigma = numbers["sigma"]
+    eta = numbers["eta"]
+    beta = numbers["beta"]
     K = 16 * np.sqrt(2) / 15 * np.pi * (eta * beta * sigma) ** 2 * np.sqrt(sigma / beta)
-    k, H, H0 = 4.4086e-5 * K * E_star, u / sigma - numbers["delta"] / sigma, numbers["H0"]
-    a0, a1 = (4 - H0) ** 6.804, -6.804 * (4 - H0) ** 5.804
+    k = 4.4086e-5 * K * E_star
+    H = u / sigma - numbers["delta"] / sigma
+    H0 = numbers["H0"]
+    a0 = (4 - H0) ** 6.804
+    a1 = -6.804 * (4 - H0) ** 5.804
     return np.where(
         H > 4,
         0.0,
@@ -116,7 +121,8 @@ def test_mbdyn_reads_the_pressure_within_the_stated_misfit(pressures):
         float,
         re.search(r"is (\S+) root mean\s(?:# )?square,\s(?:# )?(\S+) at", text).groups(),
     )
-    u, p = film.x, film.more["pressure"][0]
+    u = film.x
+    p = film.more["pressure"][0]
     kept = (p >= float(low) * 0.999) & (p <= float(high) * 1.001)
     off = np.log(pressed(numbers, u[kept], numbers["E"]) / p[kept])
     assert unit == "Pa"
@@ -242,11 +248,9 @@ def test_lethe_conducts_within_the_stated_misfit():
     set_ = {key: float(value) for key, value in re.findall(r"set ([\w ]+) = (\S+)", text)}
     # two faces: squares add up, the harmonic mean of the hardness;
     # calculate_microcontact_resistance times its area
-    sigma, slope, H = (
-        np.hypot(set_["surface roughness particles"], set_["surface roughness wall"]),
-        np.hypot(set_["surface slope particles"], set_["surface slope wall"]),
-        2 / (1 / set_["microhardness particles"] + 1 / set_["microhardness wall"]),
-    )
+    sigma = np.hypot(set_["surface roughness particles"], set_["surface roughness wall"])
+    slope = np.hypot(set_["surface slope particles"], set_["surface slope wall"])
+    H = 2 / (1 / set_["microhardness particles"] + 1 / set_["microhardness wall"])
     peak = law.x[1:]
     # of Hertz's pressure up to the peak the mean of h is h(peak)/(1 + 0.96/2)
     conductance = (1 + 0.96 / 2) * 50.0 * slope / (1.184 * sigma) * (peak / H) ** 0.96

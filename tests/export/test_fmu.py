@@ -38,10 +38,8 @@ def made(law, **options):
 
 
 def built(name, folder):
-    validation, build = (
-        pytest.importorskip("fmpy.validation"),
-        pytest.importorskip("fmpy.build"),
-    )
+    validation = pytest.importorskip("fmpy.validation")
+    build = pytest.importorskip("fmpy.build")
     (folder / "build").mkdir()
     (folder / "road.fmu").write_bytes(made(name, **MORE))
     assert validation.validate_fmu(str(folder / "road.fmu")) == []
@@ -78,7 +76,8 @@ def simulated(path, kind, c, logger=None):
 @needs("cmake", "gcc")
 @pytest.mark.parametrize("name", ["mbma", "calibrated", "persson", "turning", "hardened"])
 def test_simulation_and_directional_derivatives(name, tmp_path):
-    path, known = built(name, tmp_path), points(name)
+    path = built(name, tmp_path)
+    known = points(name)
     for kind in KINDS:
         found = simulated(path, kind, np.append(known.c, known.c[-1]))
         # co-simulation answers after a step, by the input before it
@@ -105,10 +104,11 @@ def assert_directional_derivatives(path, known):
     fmpy = pytest.importorskip("fmpy")
     said = []
     # FMPy's own logger may call that of a model before, which is gone
-    description, logger = (
-        fmpy.read_model_description(path),
-        lambda *words: said.append(words[-1]),
-    )
+    description = fmpy.read_model_description(path)
+
+    def logger(*words):
+        said.append(words[-1])
+
     model = fmpy.instantiate_fmu(path, description, "CoSimulation", logger=logger)
     model.setupExperiment()
     model.enterInitializationMode()
@@ -203,7 +203,8 @@ def test_description():
 @needs("cc")
 def test_an_fmu_runs_as_it_is(tmp_path):
     fmpy = pytest.importorskip("fmpy")
-    file, law = made("mbma", binaries="here", leakage=True), points("mbma").law
+    file = made("mbma", binaries="here", leakage=True)
+    law = points("mbma").law
     (tmp_path / "road.fmu").write_bytes(file)
     for c in (0.5, 2.0):
         asked = {
@@ -235,10 +236,8 @@ def test_a_step_outside_the_range_is_discarded_and_can_be_repeated(tmp_path):
     """An implicit tool's trial step beyond the law asks for a smaller one; it does not end the simulation."""
     fmpy = pytest.importorskip("fmpy")
     (tmp_path / "road.fmu").write_bytes(made("calibrated", binaries="here"))
-    folder, said = (
-        fmpy.extract(str(tmp_path / "road.fmu"), unzipdir=tmp_path / "road"),
-        [],
-    )
+    folder = fmpy.extract(str(tmp_path / "road.fmu"), unzipdir=tmp_path / "road")
+    said = []
     description = fmpy.read_model_description(folder)
     model = fmpy.instantiate_fmu(
         folder, description, "CoSimulation", logger=lambda *words: said.append(words[2:])

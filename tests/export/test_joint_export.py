@@ -158,10 +158,8 @@ def test_fortran_of_a_joint_runs_with_its_own_files(joint, tmp_path):
 
 @pytest.mark.parametrize(("length", "stress"), [("m", "Pa"), ("um", "GPa"), ("mm", "Pa")])
 def test_units_are_those_asked_for(joint, total, length, stress):
-    metre, pascal = (
-        {"m": 1, "mm": 1e-3, "um": 1e-6}[length],
-        {"Pa": 1, "GPa": 1e9}[stress],
-    )
+    metre = {"m": 1, "mm": 1e-3, "um": 1e-6}[length]
+    pascal = {"Pa": 1, "GPa": 1e9}[stress]
     content = json.loads(
         joint.export("json", SPAN, length_unit=length, stress_unit=stress, rtol=1e-2)
     )

@@ -45,9 +45,11 @@ def run(*command, folder, last_words=""):
 
 @pytest.fixture(scope="module")
 def compiled(tmp_path_factory):
-    folder, found = tmp_path_factory.mktemp("laws"), {}
+    folder = tmp_path_factory.mktemp("laws")
+    found = {}
     for name in ASKED:
-        path, asked = folder / f"{name}.c", HEAT | {"kappa": KAPPA, "leakage": True}
+        path = folder / f"{name}.c"
+        asked = HEAT | {"kappa": KAPPA, "leakage": True}
         path.write_text(law_points.text("c-law", name, name="road", **asked))
         for level in ("-O3", "-O2"):
             found[name] = compiled_law(
@@ -59,7 +61,8 @@ def compiled(tmp_path_factory):
 @needs("gcc")
 @pytest.mark.parametrize("name", ASKED)
 def test_c(name, compiled):
-    known, law = points(name), compiled[name]
+    known = points(name)
+    law = compiled[name]
     found = [law(quantity, known.c) for quantity in QUANTITIES]
     known.assert_equal(*found)
     known.assert_inverse(law("overclosure", known.pressures()))
@@ -81,7 +84,8 @@ def test_c(name, compiled):
 @needs("gcc")
 @pytest.mark.parametrize("name", ASKED)
 def test_c_outside_its_range(name, compiled):
-    answer, law = compiled[name], points(name).law
+    answer = compiled[name]
+    law = points(name).law
     beyond = [math.nan, math.inf, 0.5 * (law.h_max - law.lowest) * (1 + 1e-9)]
     before = (
         []
@@ -107,7 +111,8 @@ def test_c_outside_its_range(name, compiled):
 @needs("gcc")
 @pytest.mark.parametrize("name", ["mbma", "calibrated", "persson"])
 def test_leakage_apart_and_where_gaps_close(name, compiled):
-    law, leakage = points(name).law, functools.partial(compiled[name], "leakage")
+    law = points(name).law
+    leakage = functools.partial(compiled[name], "leakage")
     apart = np.geomspace(1e-9, 1e3 if math.isinf(law.highest) else 26, 200)
     np.testing.assert_allclose(
         leakage(-apart), law.leakage(separation=law.h_max + 2 * apart), rtol=VALUES
@@ -200,7 +205,8 @@ def test_c_is_the_library(name, tmp_path):
         "-fno-trapping-math",
         level,
     )
-    answer, known = compiled_law(tmp_path / "road.c", *flags), points(name)
+    answer = compiled_law(tmp_path / "road.c", *flags)
+    known = points(name)
     for quantity in QUANTITIES:
         np.testing.assert_array_equal(
             answer(quantity, known.c), getattr(known, FIELDS.get(quantity, quantity))
@@ -235,7 +241,8 @@ def test_two_laws_with_headers_in_c_and_cpp(tmp_path):
     (tmp_path / "ask.c").write_text(
         f'{text}printf("%.17g %.17g %.17g %.17g %.17g", {asks}); return 0; }}\n'
     )
-    law, seal = points("mbma").law, points("persson").law
+    law = points("mbma").law
+    seal = points("persson").law
     known = [
         law.pressure(2.0),
         law.leakage(2.0),
@@ -305,11 +312,9 @@ console.log(both(1e-3), ...asks.map(fault));
 
 @pytest.mark.parametrize("name", ASKED)
 def test_python(name, tmp_path):
-    known, road, heat = (
-        points(name),
-        types.ModuleType("road"),
-        {} if name == "hardened" else HEAT,
-    )
+    known = points(name)
+    road = types.ModuleType("road")
+    heat = {} if name == "hardened" else HEAT
     (tmp_path / "road.py").write_text(
         law_points.text("python-law", name, leakage=True, **heat)
     )
@@ -346,8 +351,10 @@ def random_faces(count, seed):
     """Surfaces of any size, whose h_max is a dyadic number times h_rms."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
-        q0, h_rms = 10.0 ** rng.uniform(-4, 4), 2.0 ** rng.integers(-8, 8)
-        q1, h_max = q0 * 10 ** rng.uniform(0.6, 6), h_rms * rng.integers(20, 48) / 8
+        q0 = 10.0 ** rng.uniform(-4, 4)
+        h_rms = 2.0 ** rng.integers(-8, 8)
+        q1 = q0 * 10 ** rng.uniform(0.6, 6)
+        h_max = h_rms * rng.integers(20, 48) / 8
         yield Surface(rng.uniform(0.1, 1.0), q0, q1, h_rms, h_max, unit="um")
 
 
@@ -438,10 +445,8 @@ def test_a_program_in_the_laws_language(target, name, tmp_path):
     ):
         pytest.skip(f"not installed: {target}")
     heat = HEAT if (target, name) == ("fortran-law", "mbma") else {}
-    known, law = (
-        points(name),
-        law_points.text(target, name, name="road", leakage=True, **heat),
-    )
+    known = points(name)
+    law = law_points.text(target, name, name="road", leakage=True, **heat)
     (tmp_path / f"road.{end}").write_text(law)
     (tmp_path / f"ask.{end}").write_text(text)
     if target == "fortran-law":
@@ -535,11 +540,14 @@ def test_abaqus_uinter(name, tmp_path):
     p, slope, energy, flux_1, flux_2, *others, opened, _ = called(
         "abaqus-uinter", UINTER, name, tmp_path, c
     )
-    inside, out = slice(known.c.size), slice(known.c.size, None)
+    inside = slice(known.c.size)
+    out = slice(known.c.size, None)
     known.assert_equal(
         p[inside], slope[inside], known.area, energy[inside], known.leakage
     )
-    by_temperature, by_gap, rest = np.array(others[:4]), others[4:6], others[6]
+    by_temperature = np.array(others[:4])
+    by_gap = others[4:6]
+    rest = others[6]
     heat = CONDUCTIVITY / 13.3 * known.tangent
     np.testing.assert_allclose(
         by_temperature[:, inside], np.outer([1, -1, -1, 1], heat), rtol=1e-11
@@ -716,13 +724,12 @@ end Ask;
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["mbma", "calibrated", "hardened"])
 def test_modelica(name, tmp_path):
-    rumoca, known = pytest.importorskip("rumoca"), points(name)
-    text, answers = (
-        law_points.text(
-            "modelica-law", name, name="road", leakage=True, kappa=KAPPA, **HEAT
-        ),
-        [],
+    rumoca = pytest.importorskip("rumoca")
+    known = points(name)
+    text = law_points.text(
+        "modelica-law", name, name="road", leakage=True, kappa=KAPPA, **HEAT
     )
+    answers = []
     for k, c in enumerate(np.array_split(known.c, 25)):
         asks = MODELICA.format(size=c.size, gaps=", ".join(map(repr, c.tolist())))
         (tmp_path / f"{k}").mkdir()
@@ -738,10 +745,8 @@ def test_modelica(name, tmp_path):
 
 @needs("gcc")
 def test_c_of_a_polynomial_over_many_decades(tmp_path):
-    surface, asked = (
-        Surface(0.3, 1.0, 3.5, 0.125, 0.125, unit="mm"),
-        {"theory": "mbma", "hardness": "0.06 MPa"},
-    )
+    surface = Surface(0.3, 1.0, 3.5, 0.125, 0.125, unit="mm")
+    asked = {"theory": "mbma", "hardness": "0.06 MPa"}
     (tmp_path / "law.c").write_text(
         law_text("c-law", surface, "1 MPa", name="road", **asked)
     )

@@ -93,10 +93,8 @@ def test_the_header_says_up_to_where_a_law_is_valid():
         for line in law_of().comments
         if line.startswith("not valid") and "areas" in line
     )
-    root, said = (
-        contact(CONCRETE, 13.3, area=0.1, theory="mbma").pressure,
-        float(areas.split("above p = ")[1].split()[0]),
-    )
+    root = contact(CONCRETE, 13.3, area=0.1, theory="mbma").pressure
+    said = float(areas.split("above p = ")[1].split()[0])
     assert root * 0.999 <= said <= root
     assert any(
         "scatter" in line and "ln p at a given c" in line for line in law_of().comments
@@ -135,10 +133,12 @@ def test_fewest_rows(monkeypatch):
 
 
 def test_force_and_conductance_in_one_interaction():
-    law, plain = law_of(**HEAT, rows=20), law_of(rows=20)
+    law = law_of(**HEAT, rows=20)
+    plain = law_of(rows=20)
     assert law.largest_error < 2e-2
     assert (law.x_name, law.y_name, law.y_unit) == ("pressure", "conductance", "mW/K/mm")
-    text, abaqus = calculix(law, "JOINT"), solvers.abaqus(law, "JOINT")
+    text = calculix(law, "JOINT")
+    abaqus = solvers.abaqus(law, "JOINT")
     assert (
         "*SURFACE INTERACTION, NAME=JOINT\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL\n"
         in text
@@ -306,12 +306,11 @@ def test_light_loads_are_within_the_error_too(theory, quantity):
     pressure = np.geomspace(1.001e-5, 0.0999, 400)
     found = contact(CONCRETE, 13.3, pressure=pressure, theory=theory)
     if quantity == "pressure":
-        model, read = (
-            pressure,
-            np.interp(CONCRETE.h_max - found.mean_separation, law.x, law.y),
-        )
+        model = pressure
+        read = np.interp(CONCRETE.h_max - found.mean_separation, law.x, law.y)
     else:
-        model, read = found.stiffness * 50.0 / 13.3, np.interp(pressure, law.x, law.y)
+        model = found.stiffness * 50.0 / 13.3
+        read = np.interp(pressure, law.x, law.y)
     assert np.abs(read / model - 1).max() <= 1.05e-2
     assert law.largest_error <= 1e-2
     assert law.x.size < 200
@@ -405,7 +404,8 @@ def test_rows_of_a_law_with_a_hardness():
     known = functools.partial(
         contact, HARD, Bodies(100e3, hardness=1500.0), theory="calibrated"
     )
-    law, elastic = joint(**asked), joint()
+    law = joint(**asked)
+    elastic = joint()
     # chords lie about the law by as much as they may miss it
     kept = law.y > 1.0
     assert law.y[kept] == pytest.approx(

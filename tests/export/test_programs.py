@@ -19,7 +19,10 @@ SIDES = {"mm": 10.0, "m": 0.01}
 ROUGH = Surface.named("challenge").to("mm")
 PRESSURES = np.geomspace(0.012, 1.9, 6)  # MPa
 HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
-LOW, BETWEEN, TOP = range(1, 5), range(5, 13), range(13, 17)  # nodes
+# nodes
+LOW = range(1, 5)
+BETWEEN = range(5, 13)
+TOP = range(13, 17)
 
 
 def each(nodes, words):
@@ -116,10 +119,8 @@ def test_calculix_has_closure_and_conductance_in_one_interaction(tmp_path):
     law = contact_law(ROUGH, "25 MPa", theory="mbma")
     asked = HEAT | {"pressures": ("10 kPa", "2 MPa"), "rows": 20, "theory": "mbma"}
     rows = describe_law(ROUGH, "25 MPa", quantity="conductance", **asked)
-    card, c = (
-        solvers.calculix(rows),
-        law.h_max - law.at_pressure(PRESSURES).mean_separation,
-    )
+    card = solvers.calculix(rows)
+    c = law.h_max - law.at_pressure(PRESSURES).mean_separation
     moved = (each(TOP, f"3, 3, {-down:.9e}") for down in c + 20 * PRESSURES / 1e6)
     said, p, flux = calculix(heated(card, moved, 10.0, 1e6), tmp_path)
     assert len(p) == len(flux) == PRESSURES.size, said.stdout[-1000:]
@@ -148,10 +149,8 @@ def test_calculix_has_closure_and_conductance_in_one_interaction(tmp_path):
     ("length", "stress", "theory"), [("mm", "MPa", "mbma"), ("m", "Pa", "calibrated")]
 )
 def test_calculix_feels_the_law(tmp_path, length, stress, theory):
-    surface, E_star = (
-        Surface.named("concrete").to(length),
-        {"MPa": 13.3, "Pa": 13.3e6}[stress],
-    )
+    surface = Surface.named("concrete").to(length)
+    E_star = {"MPa": 13.3, "Pa": 13.3e6}[stress]
     top = 0.04 * E_star
     law = describe_law(
         surface,
@@ -184,7 +183,9 @@ def test_calculix_feels_rows_of_nanometres_in_any_unit(tmp_path, length, side):
     digits of small overlaps.
     """
     surface = Surface.from_map(MAPS / "top-1.top", short_cutoff="9.4 nm").to(length)
-    low, high, E_star = 1e-4, 1000.0, 1e5
+    low = 1e-4
+    high = 1000.0
+    E_star = 1e5
     law = describe_law(
         surface,
         E_star,
@@ -250,8 +251,10 @@ def test_calculix_conducts_as_the_law_says(tmp_path, length, stress):
         quantity="conductance",
         **asked,
     )
-    side, unit = SIDES[length], {"MPa": 1.0, "Pa": 1e6}[stress]
-    pressures, card = unit * np.geomspace(1.1e-3, 1.9, 8), solvers.calculix(law)
+    side = SIDES[length]
+    unit = {"MPa": 1.0, "Pa": 1e6}[stress]
+    pressures = unit * np.geomspace(1.1e-3, 1.9, 8)
+    card = solvers.calculix(law)
     slope = re.search(r"with the line (\S+) below", card.replace("\n** ", " "))[1]
     card = re.sub(r"=EXPONENTIAL\n.*\n", f"=LINEAR\n{slope}\n", card)
     forces = (f"*CLOAD\n{each(TOP, f'3, {-p * side**2 / 4:.9e}')}" for p in pressures)

@@ -31,7 +31,8 @@ RECIPE = Recipe("self_affine", 0.8, 8, 2, 5, 64)
 def test_wavy_surface_against_westergaard(share):
     # mean pressure p over p* = pi E* amplitude/wavelength: A/A0 = (2/pi) asin(sqrt(p/p*))
     # (Westergaard 1939)
-    amplitude, points = 0.01, 512
+    amplitude = 0.01
+    points = 512
     wave = amplitude * np.cos(2 * np.pi * np.arange(points) / points)
     full = np.pi * amplitude
     contact = Contact(np.tile(wave[:, None], (1, 8)), (1.0, 8 / points), 1e-9)
@@ -50,7 +51,8 @@ def test_wavy_surface_against_westergaard(share):
 def test_sphere_against_hertz():
     # Hertz (1882), E* = R = 1: F = 4 a^3/3, pressure (2 a/pi) sqrt(1 - r^2/a^2), whose mean
     # of -r^2/2 is -a^2/5
-    points, radius = 192, 0.12
+    points = 192
+    radius = 0.12
     x = (np.arange(points) + 0.5) / points - 0.5
     contact = Contact(-(x[:, None] ** 2 + x[None, :] ** 2) / 2, SQUARE, 1e-9)
     result = contact.press(4 * radius**3 / 3)
@@ -101,7 +103,8 @@ def test_transforms_skew_and_normalise(kind, shape):
     z = heights(Recipe(kind, 0.8, 4, 4, 3, 128, shape))
     assert abs(z.mean()) < 1e-12
     assert z.std() == pytest.approx(1)
-    skewness, kurtosis = np.mean(z**3), np.mean(z**4)
+    skewness = np.mean(z**3)
+    kurtosis = np.mean(z**4)
     assert {
         "peaks": skewness > 0.5,
         "valleys": skewness < -0.5,

@@ -113,7 +113,8 @@ def test_a_held_out_point_on_a_node_is_refused(nodes, monkeypatch):
     ("kind", "targets"), [("universal", (1e-4, 1e-6, 1e-8)), ("island4d", (1e-1, 2e-2))]
 )
 def test_a_tighter_target_takes_more_coefficients_and_is_met(kind, targets, tmp_path):
-    sizes, largest = [], []
+    sizes = []
+    largest = []
     for target in targets:
         content = KINDS[kind](load(kind, small(tmp_path, kind), target)).build()
         largest.append(max(content.attributes[f"largest_error_{f}"] for f in "FA"))
@@ -180,7 +181,8 @@ def test_what_no_islands_can_do_breaks_a_rule_in_a_cell():
 
 def test_any_workers_give_the_same_bits(monkeypatch):
     monkeypatch.setattr(certificate, "CHUNK", 10)
-    X, mu = np.linspace(0.0, 5.0, 40), np.geomspace(1e-3, 10.0, 40)
+    X = np.linspace(0.0, 5.0, 40)
+    mu = np.geomspace(1e-3, 10.0, 40)
     expected = phi(X, mu, 1e-6)
     for workers in (1, 2):
         found = Kind(load("universal"), workers).phi(
@@ -244,7 +246,8 @@ def test_tables_rebuilt_on_another_processor_have_the_same_values(
     """numpy's functions and BLAS round otherwise there, and coefficients are rounded to 40 binary digits after that."""
     if processor != "this one" and platform.machine() not in ("x86_64", "AMD64"):
         pytest.skip("kernels of x86-64")
-    old, new = read_table(shipped(kind)), rebuilt(kind, tmp_path, **PROCESSORS[processor])
+    old = read_table(shipped(kind))
+    new = rebuilt(kind, tmp_path, **PROCESSORS[processor])
     assert {n: a.shape for n, a in old.arrays().items()} == {
         n: a.shape for n, a in new.arrays().items()
     }
@@ -359,12 +362,11 @@ def test_few_certificate_points_are_for_tables_that_are_not_shipped(tmp_path):
 
 
 def test_a_target_alone_is_a_configuration():
-    shipped, same = load("island4d"), load("island4d", target=4e-4)
+    shipped = load("island4d")
+    same = load("island4d", target=4e-4)
     assert same == shipped
-    loose, tight = (
-        load("island4d", target=0.1),
-        load("island4d", target=shipped.target / 2),
-    )
+    loose = load("island4d", target=0.1)
+    tight = load("island4d", target=shipped.target / 2)
     # errors are of fourth order
     assert [axis.nodes for axis in tight.axes.values()] == [27, 55, 10, 16]
     assert {axis.nodes for axis in loose.axes.values()} < set(range(8, 20))
@@ -383,7 +385,8 @@ def test_a_target_alone_is_a_configuration():
 def test_a_file_changes_what_it_names(tmp_path):
     path = tmp_path / "own.toml"
     path.write_text("[axes.spread]\nhigh = 10.0\nnodes = 17")
-    found, shipped = load("island4d", path), load("island4d")
+    found = load("island4d", path)
+    shipped = load("island4d")
     assert found.axes["spread"] == dataclasses.replace(
         shipped.axes["spread"], high=10.0, nodes=17
     )

@@ -13,7 +13,8 @@ from mbma_tables.scenes.plan import read_costs, shipped_costs, shipped_distances
 from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma import greenwood_tripp
 
-COST, SECONDS = 2.0, 1e-3
+COST = 2.0
+SECONDS = 1e-3
 
 
 def once(run):
@@ -27,7 +28,8 @@ def by_variant(rows):
 
 
 def test_references_agree_with_the_solver():
-    surface, truth = cost.SURFACES[3], cost.reference()[3]
+    surface = cost.SURFACES[3]
+    truth = cost.reference()[3]
     answer = contact(
         surface,
         separation=cost.gaps_of(surface)[:: cost.EVERY],
@@ -89,7 +91,8 @@ def test_totals_laws_and_theories(monkeypatch):
 
 
 def test_a_study_becomes_data(tmp_path, monkeypatch):
-    shipped, seconds = shipped_costs(), iter([3.0, shipped_costs().seconds, *[2.0] * 5])
+    shipped = shipped_costs()
+    seconds = iter([3.0, shipped_costs().seconds, *[2.0] * 5])
     own = [row for row in shipped.rows if row.island_model != "unit"]
     for name in ("island", "scene", "gap", "law", "theory", "first_use"):
         monkeypatch.setattr(

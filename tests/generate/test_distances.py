@@ -78,10 +78,8 @@ def test_a_theory_is_at_no_distance_from_itself(bem):
 def test_held_out_distances_are_those_of_the_shipped_file():
     sets = distances.data_sets()
     with xr.open_dataset(shipped_file("calibrated.nc")) as data:
-        names, edges = (
-            data.attrs["sets"].split("; "),
-            (data.contact_low.values, data.contact_high.values),
-        )
+        names = data.attrs["sets"].split("; ")
+        edges = (data.contact_low.values, data.contact_high.values)
         stated = data.accuracy.values[names.index("held_out_spectrum, 4 waves, spectrum")]
     seen = [
         one for one in (*sets["spectra"].seen, *sets["plateau"].seen) if one.waves >= 4
@@ -140,7 +138,9 @@ def test_committed_page_is_what_the_code_computes():
 
 # an exponential law, which is inverted in closed form, as a function of the gap and as an
 # object by pressure
-POWER, DECAY, KAPPA = 0.4, 0.5, 1.8
+POWER = 0.4
+DECAY = 0.5
+KAPPA = 1.8
 FILE = f"""
 import numpy as np
 

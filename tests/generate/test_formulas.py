@@ -48,7 +48,8 @@ def few(monkeypatch):
 
 def test_the_largest_error_is_least():
     rng = np.random.default_rng(4)
-    M, target = rng.normal(size=(60, 4)), rng.normal(size=60)
+    M = rng.normal(size=(60, 4))
+    target = rng.normal(size=60)
     ones = np.ones((60, 1))
     exact = linprog(
         [0, 0, 0, 0, 1],
@@ -140,11 +141,9 @@ def test_the_shipped_text_is_what_the_generator_prints():
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_core_agrees_with_sympy_in_30_digits(name):
-    function, steps, rng = (
-        SHIPPED[name],
-        expressions(SHIPPED[name]),
-        np.random.default_rng(5),
-    )
+    function = SHIPPED[name]
+    steps = expressions(SHIPPED[name])
+    rng = np.random.default_rng(5)
     ranges = RANGES[function.form]
     given = {
         argument: rng.uniform(*ranges[argument], 2)

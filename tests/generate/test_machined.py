@@ -46,7 +46,8 @@ def test_truth_of_a_part():
 
 
 def test_what_is_solved_and_answered_becomes_the_group(data, tmp_path, monkeypatch):
-    rng, part = np.random.default_rng(1), Part("honed", 2, 64)
+    rng = np.random.default_rng(1)
+    part = Part("honed", 2, 64)
     monkeypatch.setattr(campaign, "parts", lambda: [part])
     for form in ("", *campaign.FORMS, "hardness"):
         (tmp_path / form).mkdir(exist_ok=True)
@@ -71,7 +72,8 @@ def test_what_is_solved_and_answered_becomes_the_group(data, tmp_path, monkeypat
 def test_the_file_is_of_these_makers(data):
     assert data.sizes["surface"] == len(campaign.parts()) == 142
     for part in (Part("honed", 1), Part("eroded", 9), Part("worn", 2, 512)):
-        values, name = heights(part), part.name
+        values = heights(part)
+        name = part.name
         assert float(data.h_rms.sel(surface=name)) == pytest.approx(
             values.std(), rel=1e-6
         )
@@ -156,10 +158,8 @@ def test_hardness_of_maps(data):
 
 def test_the_quick_law_is_wrong_where_it_is_not_valid(data):
     for quantity in ("area", "pressure", "stiffness"):
-        error, kept = (
-            np.abs(evaluation.errors(data, "calibrated", quantity)),
-            evaluation.seen(data, "calibrated", quantity),
-        )
+        error = np.abs(evaluation.errors(data, "calibrated", quantity))
+        kept = evaluation.seen(data, "calibrated", quantity)
         valid = data.calibrated_valid.values[..., None] > 0.5
         assert np.median(error[kept & ~valid]) > np.median(error[kept & valid])
         once, twice, _ = evaluation.coverage(data, "calibrated", quantity, False)
@@ -176,7 +176,8 @@ def test_plateaus_are_nearer_by_the_constants_that_were_fitted_to_them(
 ):
     missed = []
     for part in (Part(family, number) for number in range(campaign.NUMBERS)):
-        one, own = data.sel(surface=part.name), surface_of(part)[1]
+        one = data.sel(surface=part.name)
+        own = surface_of(part)[1]
         law = MapLaw.from_curves(own.bearing, own.bands)
         for shift in (0.0, PLATEAU_SHIFT):
             other = dataclasses.replace(law, plateau_shift=shift)

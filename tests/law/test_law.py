@@ -61,7 +61,8 @@ def depths(law, seed, least=1e-9):
 
 
 def pieces_of(law):
-    centre, half = law.records[1:, at.CENTRE], 1 / law.records[1:, at.RATE]
+    centre = law.records[1:, at.CENTRE]
+    half = 1 / law.records[1:, at.RATE]
     return 2 * law.h_max * (centre - half), 2 * law.h_max * (centre + half)
 
 
@@ -105,7 +106,8 @@ def test_of_any_island_model(island_model):
 def test_slopes_are_those_of_the_law_itself(case):
     law = law_of(case, 1e-4)
     low, high = pieces_of(law)
-    centres, span = (low + high) / 2, (high - low) / 40
+    centres = (low + high) / 2
+    span = (high - low) / 40
     gaps = law.h_max - centres
     offsets = np.arange(-3.0, 4)
     weights = difference_weights(offsets)
@@ -145,10 +147,8 @@ def test_energy_is_the_integral_of_force(case):
 )
 def test_turning_points(surface, variant, name):
     law = contact_law(surface, theory=Mbma(variant=variant))
-    value, turn = (
-        getattr(law, name),
-        law.turning_point if name == "pressure" else law.area_turning_point,
-    )
+    value = getattr(law, name)
+    turn = law.turning_point if name == "pressure" else law.area_turning_point
     assert -law.h_max < turn < 0
     assert name == "pressure" or turn < law.turning_point
     assert (np.diff(value(separation=np.linspace(law.h_max, turn, 200))) > 0).all()
@@ -182,9 +182,11 @@ def test_turning_points(surface, variant, name):
 
 @pytest.mark.parametrize("case", CASES)
 def test_a_pickle_is_the_same_law_and_small(case):
-    law, kept = law_of(case), pickle.dumps(law_of(case))
+    law = law_of(case)
+    kept = pickle.dumps(law_of(case))
     assert len(kept) < 20_000
-    back, gaps = pickle.loads(kept), law.h_max - depths(law, 53)
+    back = pickle.loads(kept)
+    gaps = law.h_max - depths(law, 53)
     assert isinstance(back, ContactLaw)
     for name in at.QUANTITIES:
         np.testing.assert_array_equal(
@@ -213,7 +215,9 @@ def test_as_a_function_of_c():
         law.compiled("force")
     # it keeps its law
     law = contact_law(surface_of(*CASES[0][:3]), theory="mbma", rtol=1e-3)
-    gone, expected, asked = weakref.ref(law), law.pressure(separation=1.0), law.compiled()
+    gone = weakref.ref(law)
+    expected = law.pressure(separation=1.0)
+    asked = law.compiled()
     del law
     gc.collect()
     assert asked.function(1.0, asked.user_data) == expected
@@ -242,12 +246,12 @@ def test_as_a_function_of_c():
     ],
 )
 def test_bounds_of_a_profile_where_a_search_found_them_exceeded(numbers, c, rtol):
-    surface, variant = (
-        Surface(numbers[0], 1.0, numbers[1], 1.0, numbers[2]),
-        NAMED["fitted"],
-    )
-    model, c = get_model("universal", 1e-8, variant), np.linspace(*c, 40)
-    kept, rows = profile(numbers, model, variant, 0.9 * rtol), np.empty((3, c.size))
+    surface = Surface(numbers[0], 1.0, numbers[1], 1.0, numbers[2])
+    variant = NAMED["fitted"]
+    model = get_model("universal", 1e-8, variant)
+    c = np.linspace(*c, 40)
+    kept = profile(numbers, model, variant, 0.9 * rtol)
+    rows = np.empty((3, c.size))
     # force and area by the core's quadrature
     by_table(surface, c, np.arange(c.size), model, Sums(model, variant, 1e-11), rows)
     assert np.abs(kept.totals(c) / rows[:2] - 1).max() <= kept.error
@@ -287,7 +291,8 @@ def test_bounds_of_laws_where_they_were_exceeded(hurst, zeta_1, top, rtol):
 def test_no_bound_is_exceeded_on_fresh_points_of_300_laws():
     rng = np.random.default_rng(77)
     for _ in range(300):
-        top, rtol = rng.uniform(2.0, 5.0), 10 ** rng.uniform(-9, -2)
+        top = rng.uniform(2.0, 5.0)
+        rtol = 10 ** rng.uniform(-9, -2)
         surface = Surface(
             rng.uniform(0.25, 1.0), 1.0, 3 + 10 ** rng.uniform(-6, 5), 1.0, top
         )
@@ -349,7 +354,8 @@ def test_slopes_are_within_their_bound(rtol):
         surface = Surface(rng.uniform(0.3, 1), 1.0, 10 ** rng.uniform(0.7, 5), 1.0, top)
         law = contact_law(surface, theory="mbma", rtol=rtol)
         # next to the ends of pieces, where slopes are worst, next to first contact, and between
-        ends, tiny = pieces_of(law)[0], 10.0 ** np.arange(-15, -3)
+        ends = pieces_of(law)[0]
+        tiny = 10.0 ** np.arange(-15, -3)
         depth = np.concatenate(
             [
                 ends * (1 - 1e-7),
@@ -501,12 +507,11 @@ def gaps_of(law, count=3000):
 def test_the_same_bits_however_asked(name):
     law = core_law_of(name)
     d = gaps_of(law)
-    u, named = (
-        (d[d > law.lowest + 1e-9] + law.h_max) / 2,
-        xr.DataArray(d.reshape(-1, 3), dims=("a", "b")),
-    )
+    u = (d[d > law.lowest + 1e-9] + law.h_max) / 2
+    named = xr.DataArray(d.reshape(-1, 3), dims=("a", "b"))
     for what in at.QUANTITIES:
-        ask, asked = getattr(law, what), law.compiled(what)
+        ask = getattr(law, what)
+        asked = law.compiled(what)
         whole = ask(separation=d)
         assert np.isfinite(whole).all()
         for size in (1, 7, 1000, 1001):
@@ -621,7 +626,8 @@ def test_values_that_no_gap_has_are_nan_and_counted(name, which):
 
 def test_broken_blocks_are_refused():
     law = core_law_of("calibrated")
-    out, d = np.empty(1), np.zeros(1)
+    out = np.empty(1)
+    d = np.zeros(1)
 
     def refused(block):
         with pytest.raises(

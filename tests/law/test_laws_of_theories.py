@@ -80,7 +80,8 @@ def places(law, seed, count=400):
 )
 @pytest.mark.parametrize("rtol", [1e-4, 1e-8])
 def test_within_its_bound_of_the_theory(theory, surface, rtol):
-    law, chosen = law_of(theory, surface, rtol), get_theory(theory)
+    law = law_of(theory, surface, rtol)
+    chosen = get_theory(theory)
     u = places(law, 1)
     true = chosen.answer(surface, u)
     own = np.nan_to_num(true.error).max()
@@ -259,11 +260,9 @@ def test_what_is_no_theory_is_refused(wrong):
 
 
 YANG_PERSSON = Surface.named("yang-persson")
-SPHERES, FULL, LIGHT = (
-    theories.GreenwoodWilliamson(),
-    theories.Persson(),
-    theories.Persson("simplified"),
-)
+SPHERES = theories.GreenwoodWilliamson()
+FULL = theories.Persson()
+LIGHT = theories.Persson("simplified")
 
 
 def separation(surface, load, theory=FULL):

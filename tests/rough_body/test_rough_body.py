@@ -30,12 +30,15 @@ FACE = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
 @pytest.mark.parametrize("shape", ["sphere", "cylinder"])
 def test_smooth_bodies_are_hertz(shape):
     """The distance falls with the height of the roughness, to below 3e-4."""
-    R, E, before = 1000.0, 110.0, np.inf
+    R = 1000.0
+    E = 110.0
+    before = np.inf
     for h_rms in (0.05, 0.005, 0.0005):
         face = Surface(0.8, 0.05, 1.5, h_rms, 3.5 * h_rms)
         found = rough_contact(face, R, E, shape=shape, approach=1.0, theory="calibrated")
         if shape == "sphere":
-            a, force = math.sqrt(R), 4 / 3 * E * math.sqrt(R)
+            a = math.sqrt(R)
+            force = 4 / 3 * E * math.sqrt(R)
         else:  # Johnson (4.43), (5.57) of a cylinder on a rigid flat
             a = math.sqrt(4 * R * found.force / (math.pi * E))
             force = math.pi * E / (2 * math.log(4 * R / a) - 1)
@@ -66,7 +69,8 @@ def test_the_plane_operator_is_that_of_the_logarithm():
 class Asperities(Theory):
     """Greenwood and Tripp's layer, with sigma 1 and L^2 = 2 R: p = mu/(2 L) F_3/2(d), u = d + ABOVE."""
 
-    name, ends_at_h_max = "asperities", False
+    name = "asperities"
+    ends_at_h_max = False
     ABOVE = 40.0
 
     def __init__(self, mu, L):
@@ -92,7 +96,8 @@ class Asperities(Theory):
 
 @pytest.mark.parametrize("mu", [1.0, 30.0])
 def test_the_island_problem_by_another_solver(mu):
-    R, X = 300.0, np.array([-1.0, 3.0, 8.0])
+    R = 300.0
+    X = np.array([-1.0, 3.0, 8.0])
     L = math.sqrt(2 * R)
     found = Asperities(mu, L).pressed(R, X)
     np.testing.assert_allclose(
@@ -103,10 +108,12 @@ def test_the_island_problem_by_another_solver(mu):
 @pytest.mark.parametrize("mu", [4.0, 17.0])
 def test_the_published_limit_of_roughness(mu):
     """Up to alpha = sigma R/a0^2 = 0.05 Hertz is off by 7% at most (Greenwood, Johnson, Matsubara, Wear 100, 1984)."""
-    R, X = 300.0, np.array([5.0, 10.0, 20.0, 30.0])
+    R = 300.0
+    X = np.array([5.0, 10.0, 20.0, 30.0])
     found = Asperities(mu, math.sqrt(2 * R)).pressed(R, X)
     a0 = np.cbrt(0.75 * found.force * R)
-    alpha, p0 = R / a0**2, 2 * a0 / math.pi / R
+    alpha = R / a0**2
+    p0 = 2 * a0 / math.pi / R
     assert alpha.min() < 0.05 < alpha.max()
     wider, lower = (
         np.interp(0.05, alpha[::-1], ratio[::-1])
@@ -192,7 +199,8 @@ def test_force_and_approach_are_inverse(theory):
         np.testing.assert_allclose(
             (beside.force - again.force) / step, again.stiffness, rtol=1e-3
         )
-        r, p = again.position, again.pressure
+        r = again.position
+        p = again.pressure
         whole = np.trapezoid(2 * np.pi * r * p if shape == "sphere" else 2 * p, r)
         np.testing.assert_allclose(whole, again.force, rtol=2e-3)
 

@@ -176,7 +176,8 @@ def test_costs_are_those_of_the_measured_row(tmp_path, asked, cost):
 
 
 def test_shipped_costs_have_what_plans_need():
-    costs, calls = shipped_costs(), ("gap", "call", "import", "law")
+    costs = shipped_costs()
+    calls = ("gap", "call", "import", "law")
     needed = dict.fromkeys(("exact", "universal", "rigid"), calls) | {
         "law": ("lookup", "invert")
     }

@@ -107,10 +107,8 @@ def hertz_area(gap):
         float(CONCRETE.zeta_1),
         float(CONCRETE.h_max / CONCRETE.h_rms),
     )
-    source, depth = (
-        source_of(shape, REPORTED),
-        float((CONCRETE.h_max - gap) / CONCRETE.h_rms),
-    )
+    source = source_of(shape, REPORTED)
+    depth = float((CONCRETE.h_max - gap) / CONCRETE.h_rms)
 
     def integrand(x):
         g = source.islands(np.array([x]))
@@ -160,14 +158,16 @@ def test_the_whole_gaussian_adds_force_and_reaches_beyond_h_max():
 
 def test_island_statistics_add_up():
     found = scene_of("pressure", "island_statistics", points=4000).run()
-    delta, density = found["island_delta"].values, found["island_density"].values
+    delta = found["island_delta"].values
+    density = found["island_density"].values
     load = np.trapezoid(density * found["island_force"].values, delta, axis=1)
     np.testing.assert_allclose(load, found["pressure"], rtol=2e-3)
     np.testing.assert_allclose(
         np.trapezoid(density, delta, axis=1), found["island_number"], rtol=2e-2
     )
     found = scene_of("pressure_profile", deltas=[0.1, 0.4], E_star=3.0, rtol=1e-8).run()
-    r, p = found["profile_radius"].values, found["profile_pressure"].values
+    r = found["profile_radius"].values
+    p = found["profile_pressure"].values
     load = 2 * np.pi * np.trapezoid(r * p, r, axis=1)
     np.testing.assert_allclose(
         load, island(CONCRETE, [0.1, 0.4], E_star=3.0).force, rtol=5e-2
@@ -275,7 +275,8 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
         count(theory, "answer", theory.name)
     count(Yielding, "__init__", "yield")
     Scene(CONCRETE, **arguments_of(effects)).run()
-    asked, yields = set(effects), "yield" in effects
+    asked = set(effects)
+    yields = "yield" in effects
     expected = {
         "contact": int(bool(asked & set(OF_CONTACT))),
         "leakage": int("leakage" in asked),

@@ -94,7 +94,8 @@ def test_validity_is_an_effect(theory):
     # of gaps that are numbers, so that both are asked the same
     u = (CONCRETE.h_max + np.array([0.5, -1.0])) / 2
     scene = scene_of(theory, effects=("pressure", "validity"), mean_separations=u)
-    text, found = scene.explain(), scene.run()
+    text = scene.explain()
+    found = scene.run()
     assert f"  theory: {theory}\n" in text
     assert (
         "-> contact by universal" if theory == "mbma" else f"-> contact by {theory}"
@@ -174,10 +175,8 @@ def test_a_scene_yields_as_contact_does(theory):
 
 @pytest.mark.parametrize("cap", [{}, {"hardness": 1500.0}], ids=["elastic", "yield"])
 def test_theories_beside_one_another(cap):
-    asked, others = (
-        {"mean_separations": [0.5, 1.5], "E_star": 100e3} | cap,
-        ["persson", "calibrated"],
-    )
+    asked = {"mean_separations": [0.5, 1.5], "E_star": 100e3} | cap
+    others = ["persson", "calibrated"]
     effects = ["pressure", "area", "comparison", *(["yield"] if cap else [])]
     found = Scene(SURFACE, effects, theories=others, theory="mbma", **asked).run()
     for name in others:

@@ -115,7 +115,8 @@ def test_one_trace_is_never_valid():
 
 
 def test_doubts_go_on_to_what_is_made_of_a_surface():
-    trace, clean = Surface.from_profile(MAP[:, 5], 1.0), of(MAP)
+    trace = Surface.from_profile(MAP[:, 5], 1.0)
+    clean = of(MAP)
     for made in (trace.combined(clean), clean.combined(trace), trace.resized(2.0, 1.0)):
         assert made.doubts == trace.doubts
     spoilt = of(with_spikes(0.0)[0])

@@ -161,7 +161,8 @@ class TestTopography:
         topography = topographies().Topography(
             BASE, (SIDE, SIDE), periodic=True, unit="um"
         )
-        found, plain = from_map(topography), from_map(BASE, STEP, periodic=True)
+        found = from_map(topography)
+        plain = from_map(BASE, STEP, periodic=True)
         assert found.h_rms == pytest.approx(plain.h_rms, rel=1e-12)
         assert (found.fit, found.unit) == (plain.fit, "um")
 
@@ -300,10 +301,12 @@ class TestFiles:
 
 def cut_out(seed, roll_off, points=128, tiles=4):
     """A part of a larger periodic map with H = 0.8 and its own mean squared gradient; 1 wide, six points a wave."""
-    count, part = tiles * points, (slice(points), slice(points))
+    count = tiles * points
+    part = (slice(points), slice(points))
     truth = Surface(0.8, tiles / roll_off, count / 6, 1.0, 3.0)
     whole = synthetic(truth, count, seed=seed, plateau=True, gaussian=True)
-    q, transform = 2 * np.pi * np.fft.fftfreq(count, 1 / points), np.fft.fft2(whole)
+    q = 2 * np.pi * np.fft.fftfreq(count, 1 / points)
+    transform = np.fft.fft2(whole)
     slopes = [np.fft.ifft2(1j * wave * transform).real[part] for wave in (q[:, None], q)]
     return whole[part], math.sqrt(sum(np.mean(slope**2) for slope in slopes))
 

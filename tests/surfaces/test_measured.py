@@ -42,7 +42,8 @@ def integral(order: int, low: float, high: float) -> float:
     share = {0: 1, 2: 0.5, 4: 0.375}[order]
     total = mpmath.mpf(0)
     for a, b, first, last in zip(Q[:-1], Q[1:], C[:-1], C[1:], strict=True):
-        start, end = max(a, low), min(b, high)
+        start = max(a, low)
+        end = min(b, high)
         if b > a and first > 0 and last > 0 and end > start:
             power = math.log(last / first) / math.log(b / a)
             total += mpmath.quad(
@@ -66,7 +67,8 @@ class TestPowerLaws:
                 (9.0, 40.0),
                 (30.0, 30.001),
             ]:
-                a, b = laws.place(low), laws.place(high)
+                a = laws.place(low)
+                b = laws.place(high)
                 assert laws.between(order, a, b) == pytest.approx(
                     integral(order, low, high), rel=1e-10
                 )
@@ -163,8 +165,10 @@ class TestCombined:
     @pytest.mark.parametrize("law", ["exponential", "uniform", "normal"])
     def test_heights_convolve(self, law: str):
         rng = np.random.default_rng(5)
-        x, y = rng.normal(size=200_000), getattr(rng, law)(size=200_000)
-        found, truth = Heights.of(x).convolved(Heights.of(y)), Heights.of(x + y)
+        x = rng.normal(size=200_000)
+        y = getattr(rng, law)(size=200_000)
+        found = Heights.of(x).convolved(Heights.of(y))
+        truth = Heights.of(x + y)
         middle = (SHARES > 0.001) & (SHARES < 0.999)
         assert (
             np.abs(found.quantiles - truth.quantiles)[middle].max() < 0.03 * truth.h_rms
@@ -187,10 +191,8 @@ class TestCombined:
             "the relative position of the maps is not known" in both.provenance[0]["told"]
         )
         # parallel lays: gradients' mean squares add along both axes
-        square, m2 = (
-            np.array([one.anisotropy, other.anisotropy]) ** 2,
-            np.array([one.m2, other.m2]),
-        )
+        square = np.array([one.anisotropy, other.anisotropy]) ** 2
+        m2 = np.array([one.m2, other.m2])
         assert both.anisotropy == pytest.approx(
             np.sqrt(m2 @ (square / (1 + square)) / (m2 @ (1 / (1 + square))))
         )
@@ -325,11 +327,9 @@ class TestScans:
         assert mean.h_rms == pytest.approx(float(whole.h_rms), rel=0.1)
 
     def test_their_spread_adds_to_the_scatter(self, scans):
-        parts, areas, names = (
-            scans[1][:4],
-            [0.03, 0.2],
-            ("scatter", "area_scatter", "stiffness_scatter"),
-        )
+        parts = scans[1][:4]
+        areas = [0.03, 0.2]
+        names = ("scatter", "area_scatter", "stiffness_scatter")
         mean = average(parts)
         found, alone = (
             contact(one, area=areas)

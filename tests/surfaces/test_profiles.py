@@ -134,7 +134,8 @@ test_refused = refusals(
 @pytest.mark.parametrize("cut", [8.0, 20.0])
 def test_a_cut_line_is_that_of_the_cut_surface(cut):
     # waves along the line that are longer than the cut-off are in part of oblique shorter ones
-    C, ratios = plateau(0.6, ROLL_OFF, ROLL_OFF / 4), []
+    C = plateau(0.6, ROLL_OFF, ROLL_OFF / 4)
+    ratios = []
     for seed in range(4):
         found = Surface.from_profile(rough_line(seed), 1.0, short_cutoff=cut)
         m2, m4 = moments(
@@ -149,10 +150,8 @@ def test_a_cut_line_is_that_of_the_cut_surface(cut):
 
 def test_points_of_a_line_go_forward(tmp_path):
     pytest.importorskip("SurfaceTopography")
-    x, z = (
-        np.random.default_rng(1).random(100),
-        np.random.default_rng(2).normal(size=100).cumsum(),
-    )
+    x = np.random.default_rng(1).random(100)
+    z = np.random.default_rng(2).normal(size=100).cumsum()
     for places, message in (
         (x, "must be in the order of rising x"),
         (np.arange(100)[::-1], "x and y rising, got -100"),

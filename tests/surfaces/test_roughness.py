@@ -24,7 +24,8 @@ SURFACE = Surface(0.75, 0.02, 5.0, 0.6, 2.1, unit="um")
 
 def drawn_from(surface):
     """What an ideal instrument says of a Gaussian isotropic surface."""
-    slope, mean = float(np.sqrt(surface.m2)), math.sqrt(2 / math.pi) * surface.h_rms
+    slope = float(np.sqrt(surface.m2))
+    mean = math.sqrt(2 / math.pi) * surface.h_rms
     heights = {"Rq": surface.h_rms, "Ra": mean, "Sq": surface.h_rms, "Sa": mean}
     slopes = {
         "Rdq": slope,
@@ -90,7 +91,8 @@ def test_arrays_and_units():
 @pytest.mark.slow
 def test_a_simulated_profile_has_these_numbers():
     """A random surface of a given spectrum: its profiles by the definitions of the standard, mean over 400 lines."""
-    points, surface = 2048, Surface(0.8, 2 * math.pi / 100, 2 * math.pi / 6, 1.0, 4.0)
+    points = 2048
+    surface = Surface(0.8, 2 * math.pi / 100, 2 * math.pi / 6, 1.0, 4.0)
     heights = random_map(points, 1 / 100, 1 / 6, seed=3, phases=True)
     lines = heights[:: points // 400] / heights.std()
     slopes = np.fft.irfft(1j * 2 * math.pi * np.fft.rfftfreq(points) * np.fft.rfft(lines))
@@ -189,7 +191,8 @@ NUMBERS = {"hurst": 0.8, "q0": 0.025, "q1": 3.0, "h_rms": 1.0, "unit": "um"}
     ],
 )
 def test_medians_and_spread_are_those_of_simulated_surfaces(kind, hurst, zeta_1, waves):
-    tops, slopes = [], []
+    tops = []
+    slopes = []
     for seed in range(48):
         z = heights(Recipe(kind, hurst, zeta_1, waves, 500 + seed, 256))
         tops.append(z.max())
@@ -312,10 +315,8 @@ def test_a_roll_off_by_name():
         "shortest": "4 um",
         "nominal_area": "4 cm^2",
     }
-    face, plain = (
-        Surface.from_roughness(**given, rolloff="250 um"),
-        Surface.from_roughness(**given),
-    )
+    face = Surface.from_roughness(**given, rolloff="250 um")
+    plain = Surface.from_roughness(**given)
     assert face.h_rms == pytest.approx(0.5, rel=1e-12)
     q = 2 * np.pi / np.array([5000.0, 250.0, 4.0])
     np.testing.assert_allclose(face.q, q)

@@ -59,10 +59,8 @@ def test_moments_are_those_of_the_power_spectrum(hurst, zeta_1):
     )
     # Nayak's summits
     alpha = m0 * m4 / m2**2
-    density, radius = (
-        m4 / m2 / (6 * math.pi * math.sqrt(3)),
-        3 * math.sqrt(math.pi) / (8 * math.sqrt(m4)),
-    )
+    density = m4 / m2 / (6 * math.pi * math.sqrt(3))
+    radius = 3 * math.sqrt(math.pi) / (8 * math.sqrt(m4))
     found = (
         surface.alpha,
         surface.summit_density,
@@ -222,7 +220,9 @@ HURSTS = [1e-3, 0.05, 0.3, 0.5, 0.8, math.nextafter(1, 0), 1.0]
 def exact_moment(order, hurst, start, log_ratio):
     """m_n over [za, za exp(log_ratio)], from 2 H integral zeta^(n-1-2H) d zeta times the mean of cos^n."""
     with mp.workdps(50):
-        h, za, width = mp.mpf(hurst), mp.mpf(start), mp.mpf(log_ratio)
+        h = mp.mpf(hurst)
+        za = mp.mpf(start)
+        width = mp.mpf(log_ratio)
         power = order - 2 * h
         angular = {0: mp.mpf(1), 2: mp.mpf(1) / 2, 4: mp.mpf(3) / 8}[order]
         growth = mp.expm1(power * width) / power if power != 0 else width

@@ -17,7 +17,8 @@ library = topographies()
 
 # of numpy, to that library, when a test calls it
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
-POINTS, STEP = 96, 0.25
+POINTS = 96
+STEP = 0.25
 SIDE = POINTS * STEP
 
 
@@ -108,10 +109,8 @@ def test_a_bad_pixel_goes_and_little_else():
 class TestCutoff:
     @pytest.mark.parametrize("periodic", [True, False])
     def test_gradient_and_variance_that_go(self, periodic):
-        whole, cut = (
-            treated(periodic=periodic),
-            treated(periodic=periodic, short_cutoff=SIDE / 6.5),
-        )
+        whole = treated(periodic=periodic)
+        cut = treated(periodic=periodic, short_cutoff=SIDE / 6.5)
         entry = next(e for e in cut.provenance if e["step"] == "short_cutoff")
 
         def squares(heights):
@@ -125,7 +124,8 @@ class TestCutoff:
                 sum(np.square(part) for part in scan.fourier_derivative())
             )
 
-        before, after = squares(whole.heights), squares(cut.heights)
+        before = squares(whole.heights)
+        after = squares(cut.heights)
         assert entry["of_variance"] == pytest.approx(1 - after[0] / before[0], rel=1e-9)
         assert entry["of_gradient"] == pytest.approx(1 - after[1] / before[1], rel=1e-9)
         assert 0.1 < entry["of_gradient"] < 0.9
@@ -185,11 +185,9 @@ class TestFilters:
         assert 2 * np.pi / float(own.q1) == pytest.approx(0.388 * 10, rel=0.1)
 
 
-BOW, TILT, SPIKE = (
-    (np.arange(64.0)[:, None] - 32) ** 2 / 100,
-    np.arange(64.0) / 10,
-    np.zeros((64, 64)),
-)
+BOW = (np.arange(64.0)[:, None] - 32) ** 2 / 100
+TILT = np.arange(64.0) / 10
+SPIKE = np.zeros((64, 64))
 SPIKE[10, 20] = 50.0
 
 
@@ -268,10 +266,8 @@ class TestReading:
         (tmp_path / "a.xyz").write_text(
             "\n".join([header, *(" ".join(map(str, p)) for p in LIST)]), "latin-1"
         )
-        found, plain = (
-            Surface.from_map(tmp_path / "a.xyz"),
-            Surface.from_map(MAP[:40, :40], STEP),
-        )
+        found = Surface.from_map(tmp_path / "a.xyz")
+        plain = Surface.from_map(MAP[:40, :40], STEP)
         assert found.unit == unit
         assert found.h_rms == pytest.approx(scale * plain.h_rms, rel=1e-9)
         assert found.q1 == pytest.approx(plain.q1, rel=1e-9)

@@ -14,7 +14,8 @@ each = pytest.mark.parametrize("theory", THEORIES)
 
 def random_surfaces(rng, count):
     """Surfaces within and outside of what was simulated, with rms gradients below one."""
-    hurst, zeta_1 = rng.uniform(0.01, 1.0, count), 10 ** rng.uniform(0.6, 4, count)
+    hurst = rng.uniform(0.01, 1.0, count)
+    zeta_1 = 10 ** rng.uniform(0.6, 4, count)
     return Surface(hurst, 1e-6, 1e-6 * zeta_1, 1.0, rng.uniform(2.0, 10.0, count))
 
 

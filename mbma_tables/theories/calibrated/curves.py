@@ -31,14 +31,12 @@ if TYPE_CHECKING:
 
 # error of a map's curve, which is smoother than the nodes of its law, for nine maps in ten
 MAP_ERROR = 3e-2
-STRAIGHT, SAME = (
-    1.0,
-    1e-9,
-)  # range of ln F over which constant stiffness is unreliable; differences due to rounding
-NODE_STEP, FINE = (
-    0.2,
-    8,
-)  # steps of a map's curve in ln F and ln u, since its nodes are rough; parts of an integral
+# range of ln F over which constant stiffness is unreliable; differences due to rounding
+STRAIGHT = 1.0
+SAME = 1e-9
+# steps of a map's curve in ln F and ln u, since its nodes are rough; parts of an integral
+NODE_STEP = 0.2
+FINE = 8
 ENDS = ", where the light-load and near-full-contact approximations of this map leave no gap: use theory='simulated'"
 
 
@@ -46,7 +44,8 @@ class Curve:
     """A map's curve from its highest point to full contact: stiffness rises monotonically between nodes of the law."""
 
     def __init__(self, law: MapLaw, h_max: float) -> None:
-        log_force, u = LOG_FORCE, law.separation(np.exp(LOG_FORCE))
+        log_force = LOG_FORCE
+        u = law.separation(np.exp(LOG_FORCE))
         kept = np.flatnonzero((u > 1e-9) & (u < h_max * (1 - 1e-9)))
         nodes = [kept[0]]
         for k in kept:
@@ -56,7 +55,8 @@ class Curve:
                 or np.log(u[last] / u[k]) > NODE_STEP
             ):
                 nodes.append(k)
-        pressure, gap = np.append(0, np.exp(log_force[nodes])), np.append(h_max, u[nodes])
+        pressure = np.append(0, np.exp(log_force[nodes]))
+        gap = np.append(h_max, u[nodes])
         gap = convex(pressure, gap)
         # one stiffness between two nodes, at the middle
         log_u = np.log(gap)
@@ -166,14 +166,13 @@ class Curve:
             )
         lightest, heaviest = np.exp(self._log_force[[-1, 0]])
         goal = np.log(np.clip(pressure, lightest, heaviest))
-        low, high = (
-            np.full(goal.shape, self._log_u[0]),
-            np.full(goal.shape, self._log_u[-1]),
-        )
+        low = np.full(goal.shape, self._log_u[0])
+        high = np.full(goal.shape, self._log_u[-1])
         for _ in range(60):
             middle = (low + high) / 2
             more = self._log_force_at(middle) > goal
-            low, high = np.where(more, middle, low), np.where(more, high, middle)
+            low = np.where(more, middle, low)
+            high = np.where(more, high, middle)
         light = self._h_max - (self._h_max - self._top) * pressure / lightest
         full = (np.maximum(pressure / heaviest, 1) ** 2 - 1) / (2 * self._heaviest_rate)
         return np.asarray(

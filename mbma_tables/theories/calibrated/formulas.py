@@ -68,7 +68,9 @@ def force_of(
     e: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS
 ) -> FloatArray:
     """F/(A0 E* g) at A/A0 = erf(e) by the light-load factor s0; inverts `area`: 2 y^2 (1 + y/t0) = e^2 (s0 + y/t0)."""
-    wanted, s0, t0 = np.asarray(e, float), np.asarray(light), constants.area_t0
+    wanted = np.asarray(e, float)
+    s0 = np.asarray(light)
+    t0 = constants.area_t0
     # at y = e/sqrt(2) the left side is the larger, and the cubic is convex from there to its root
     y = wanted / np.sqrt(2)
     for _ in range(60):
@@ -115,7 +117,8 @@ class Spectrum:
     @classmethod
     def from_samples(cls, q: FloatArray, C: FloatArray) -> Spectrum:
         """Power laws between samples of C(q) [length^4], h_rms^2 = 2 pi integral C q dq; a repeated q is a jump."""
-        facts, none = np.empty(4), np.empty(0)
+        facts = np.empty(4)
+        none = np.empty(0)
         count = core.spectrum_waves(q, C, none, none, none, facts)
         if not count:
             raise InputError(
@@ -128,9 +131,11 @@ class Spectrum:
     @classmethod
     def from_shares(cls, x: ArrayLike, variance: ArrayLike) -> Spectrum:
         """Spectrum from bands of wavenumber x (root mean square of each) with these shares of the height variance."""
-        wavenumber, share = np.asarray(x, float), np.asarray(variance, float)
+        wavenumber = np.asarray(x, float)
+        share = np.asarray(variance, float)
         held = share > 0
-        wavenumber, share = wavenumber[held], share[held] / share[held].sum()
+        wavenumber = wavenumber[held]
+        share = share[held] / share[held].sum()
         slopes = share * wavenumber**2
         m2 = slopes.sum()
         # half of a band lies below its middle
@@ -162,11 +167,13 @@ class Law:
     @shared_property
     def _prepared(self) -> FloatArray:
         """The law in the core's format."""
-        s, highest = self.spectrum, np.inf if self.h_max is None else self.h_max
+        s = self.spectrum
+        highest = np.inf if self.h_max is None else self.h_max
         numbers = np.array(
             [s.gradient, s.alpha, *dataclasses.astuple(self.constants), highest]
         )
-        law, work = np.empty(core.words_of_spectrum_law()), np.empty(3 * s.x.size)
+        law = np.empty(core.words_of_spectrum_law())
+        work = np.empty(3 * s.x.size)
         status = core.spectrum_law_of(s.x, s.variance, s.below, numbers, work, law)
         if status == UNRESOLVED:
             raise ConvergenceError(

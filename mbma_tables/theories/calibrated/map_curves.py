@@ -26,10 +26,14 @@ from mbma_tables.theories.calibrated.formulas import (
     light_factor,
 )
 
-LIGHTEST, HEAVIEST = -16.0, 1.4  # ln F^ of a map's curve
+# ln F^ of a map's curve
+LIGHTEST = -16.0
+HEAVIEST = 1.4
 NODES = 500
 LOG_FORCE = np.linspace(LIGHTEST, HEAVIEST, NODES)
-MIN_TENSION, MIN_SHARE = 1e-12, 1e-4  # tension on fewer points is that of single points
+# tension on fewer points is that of single points
+MIN_TENSION = 1e-12
+MIN_SHARE = 1e-4
 MIN_RATIO = 0.05
 MIN_GRADIENT = 1e-3
 ELLIPTIC_AREA = 0.03  # contact above which Hertz's elliptic factor is used unchanged
@@ -64,7 +68,9 @@ MAP_CONSTANTS = MapConstants()
 # surfaces: valleys take over at a contact larger by shift (1 - exp(-(D/onset)^4)), D the
 # difference of their pressure-weighted heights there [h_rms], which is below 0.1 on
 # Gaussian maps, larger on plateaus and with pits
-PLATEAU_SHIFT, PLATEAU_ONSET, PLATEAU_AREA = 0.45, 0.8, 0.3
+PLATEAU_SHIFT = 0.45
+PLATEAU_ONSET = 0.8
+PLATEAU_AREA = 0.3
 
 
 @shared(256)
@@ -75,7 +81,8 @@ def hertz_ellipse(anisotropy: float) -> tuple[float, float]:
 
     def curvatures(b: float) -> tuple[float, float]:
         m = 1 - b * b
-        K, E = float(ellipkm1(b * b)), float(ellipe(m))
+        K = float(ellipkm1(b * b))
+        E = float(ellipe(m))
         return 2 * b / m * (E / (b * b) - K), 2 * b / m * (K - E)
 
     b = brentq(
@@ -134,7 +141,8 @@ class MapLaw:
     @shared_property
     def height_factor(self) -> float:
         """c of H_p = M(c A)."""
-        r, m = self.anisotropy, self.map_constants
+        r = self.anisotropy
+        m = self.map_constants
         breadth = self.spectrum.gradient / np.exp(
             np.sum(self.spectrum.variance * np.log(self.spectrum.x))
         )
@@ -189,7 +197,8 @@ class MapLaw:
     @shared_property
     def _contact(self) -> FloatArray:
         """A/A0 on the curve's forces."""
-        tops, valleys = self._tops_area(), self._valleys_area()
+        tops = self._tops_area()
+        valleys = self._valleys_area()
         mixed = valleys + (tops - valleys) * np.exp(
             -((tops / self.map_constants.tension_area) ** 6)
         )
@@ -222,8 +231,11 @@ class MapLaw:
     @shared_property
     def _curve(self) -> tuple[FloatArray, FloatArray]:
         """ln F and u, u falling."""
-        law, m = Law(self.spectrum, None, self.constants), self.map_constants
-        log_force, force, contact = LOG_FORCE, np.exp(LOG_FORCE), self._contact
+        law = Law(self.spectrum, None, self.constants)
+        m = self.map_constants
+        log_force = LOG_FORCE
+        force = np.exp(LOG_FORCE)
+        contact = self._contact
         # the valleys' curve, and its pressure-weighted height u + 2 U/F
         u = law.separation_persson(self.gaussian_force(force))[0]
         work = CubicSpline(log_force, u * force).antiderivative()

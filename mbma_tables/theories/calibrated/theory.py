@@ -114,7 +114,8 @@ class Batch:
             if self.shape
             else (u.ravel(), np.zeros(u.size, np.int64), u.shape, slice(None))
         )
-        gradient, h_rms = self.gradient[own], self.h_rms[own]
+        gradient = self.gradient[own]
+        h_rms = self.h_rms[own]
         x = flat / h_rms
         out = self.contacts((owner, x))
         if not self.whole:
@@ -248,7 +249,8 @@ class Calibrated(Theory):
         else:
             loads = flat / batch.gradient[own]
         # zero load is last contact
-        u, loaded = np.full(loads.size, np.inf), loads > 0
+        u = np.full(loads.size, np.inf)
+        loaded = loads > 0
         some = np.flatnonzero(batch.covered[owner] & loaded)
         u[some] = batch.separations((owner[some], loads[some]))[0]
         for law, mine in () if batch.whole else batch.outside(owner, loaded):

@@ -66,7 +66,8 @@ def read_functions(text: str) -> dict[str, dict[str, Function]]:
 
     found: dict[str, dict[str, Function]] = {}
     for form, own in tomllib.loads(text).items():
-        arguments, shared = tuple(own.pop("arguments")), steps(own.pop("shared"))
+        arguments = tuple(own.pop("arguments"))
+        shared = steps(own.pop("shared"))
         found[form] = {
             result: Function(
                 form, result, arguments, one["title"], shared | steps(one["steps"])
@@ -179,10 +180,8 @@ def closed_totals(
     >>> error < 0.1
     True
     """
-    gap, modulus = (
-        finite_array("separation", separation),
-        positive_array("E_star", E_star),
-    )
+    gap = finite_array("separation", separation)
+    modulus = positive_array("E_star", E_star)
     shape = broadcast_shape(separation=gap, surface=surface.h_rms, E_star=modulus)
     fields = (
         gap / surface.h_rms,
@@ -198,10 +197,8 @@ def closed_totals(
             (field >= low) & (field <= high),
             f"in [{low:g}, {high:g}], where the closed totals hold",
         )
-    gap, h_max = (
-        np.broadcast_to(gap, shape),
-        np.broadcast_to(np.asarray(surface.h_max), shape),
-    )
+    gap = np.broadcast_to(gap, shape)
+    h_max = np.broadcast_to(np.asarray(surface.h_max), shape)
     require("separation", gap, gap >= -h_max, "at least -h_max, where the model ends")
     require(
         "separation", gap, gap < h_max, "below h_max: there is no contact from there on"

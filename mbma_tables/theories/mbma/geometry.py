@@ -62,7 +62,8 @@ def floor_offset(hurst: Any, zeta_1: Any, floor: float) -> Any:
 def kinks(hurst: Any, zeta_1: Any, variant: Variant) -> tuple[Any, Any]:
     """delta/h_rms at which zeta_d (27) and zeta_u (30) reach their floors; arrays of one shape."""
     rms_over_s = np.sqrt(-np.expm1(-2 * hurst * np.log(zeta_1)))
-    slope_d, slope_u = 4 / 3 * variant.beta, variant.phi / (1 + variant.phi) * rms_over_s
+    slope_d = 4 / 3 * variant.beta
+    slope_u = variant.phi / (1 + variant.phi) * rms_over_s
     at_d, at_u = (
         np.sqrt(floor_offset(hurst, zeta_1, floor))
         for floor in (variant.floor_d, variant.floor_u)
@@ -89,10 +90,8 @@ def geometry(
     def end(root: FloatArray, floor: float) -> tuple[FloatArray, ...]:
         """The square root and the square of an end's offset, its log(zeta) and zeta, not below the floor."""
         top = floor_offset(hurst, zeta_1, floor)
-        square, log_zeta = (
-            root * root,
-            log_zeta_1 - np.log1p(root * root / e) / (2.0 * hurst),
-        )
+        square = root * root
+        log_zeta = log_zeta_1 - np.log1p(root * root / e) / (2.0 * hurst)
         held = square >= top
         return (
             np.where(held, np.sqrt(top), root),
@@ -188,7 +187,8 @@ def measured_islands(
     surface: MeasuredSurface, delta: FloatArray, variant: Variant
 ) -> dict[str, FloatArray]:
     """`theories.mbma.geometry.FIELDS` of islands at approaches delta > 0 [length], in powers of length."""
-    laws, floors = surface.laws, floors_of(surface, variant)
+    laws = surface.laws
+    floors = floors_of(surface, variant)
 
     def place(root: FloatArray, largest: float, floor: Place) -> Place:
         free = laws.where_above_is(np.minimum(root, largest) ** 2)
@@ -197,12 +197,12 @@ def measured_islands(
             np.where(held, floor.piece, free.piece), np.where(held, floor.rest, free.rest)
         )
 
-    root_a, root_b = floors.slope_d * delta, floors.slope_u * delta
-    at_d, at_u = (
-        place(root_a, floors.root_d, floors.at_d),
-        place(root_b, floors.root_u, floors.at_u),
-    )
-    root_a, root_b = np.minimum(root_a, floors.root_d), np.minimum(root_b, floors.root_u)
+    root_a = floors.slope_d * delta
+    root_b = floors.slope_u * delta
+    at_d = place(root_a, floors.root_d, floors.at_d)
+    at_u = place(root_b, floors.root_u, floors.at_u)
+    root_a = np.minimum(root_a, floors.root_d)
+    root_b = np.minimum(root_b, floors.root_u)
 
     def sigma_of(m0: FloatArray, m2: FloatArray, m4: FloatArray) -> FloatArray:
         # (m2/m0) (m2/m4): squares of small moments might underflow
@@ -213,17 +213,16 @@ def measured_islands(
     below_0, below_2, below_4 = (laws.below(order, at_d) for order in (0, 2, 4))
     D = m4 / m2 / variant.density_divisor
     sigma = sigma_of((root_a - root_b) * (root_a + root_b), m2, m4)
-    R_d, R_u = RADIUS / np.sqrt(below_4), RADIUS / np.sqrt(laws.below(4, at_u))
-    D_top, R_top = (
-        surface.m4 / surface.m2 / variant.density_divisor,
-        RADIUS / np.sqrt(surface.m4),
-    )
-    log_d, log_u = laws.log_q(at_d), laws.log_q(at_u)
-    D_d, sigma_d = (
-        below_4 / below_2 / variant.density_divisor,
-        sigma_of(below_0, below_2, below_4),
-    )
+    R_d = RADIUS / np.sqrt(below_4)
+    R_u = RADIUS / np.sqrt(laws.below(4, at_u))
+    D_top = surface.m4 / surface.m2 / variant.density_divisor
+    R_top = RADIUS / np.sqrt(surface.m4)
+    log_d = laws.log_q(at_d)
+    log_u = laws.log_q(at_u)
+    D_d = below_4 / below_2 / variant.density_divisor
+    sigma_d = sigma_of(below_0, below_2, below_4)
     width = np.where(at_d.piece == at_u.piece, at_d.rest - at_u.rest, log_u - log_d)
-    zeta_d, zeta_u = np.exp(log_d) / surface.q0, np.exp(log_u) / surface.q0
+    zeta_d = np.exp(log_d) / surface.q0
+    zeta_u = np.exp(log_u) / surface.q0
     bands = zeta_d, zeta_u, R_d, R_u, D, sigma, root_a, root_b, D_d, sigma_d, width
     return _fields(delta, bands, D_top, R_top, variant)

@@ -57,10 +57,8 @@ class IslandSolution:
     @functools.cached_property
     def _profiles(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         count = int(np.max(self.nodes))
-        shape, profiles = (
-            (*np.shape(self.X), count),
-            np.empty((3, np.size(self.X), count)),
-        )
+        shape = (*np.shape(self.X), count)
+        profiles = np.empty((3, np.size(self.X), count))
         _newton(np.ravel(self.X), np.ravel(self.mu), self.rtol, count, profiles)
         rho, pressure, gap = (rows.reshape(shape) for rows in profiles)
         return rho, pressure, gap
@@ -89,8 +87,10 @@ def _newton(
 
     `profiles` (3, entries, nodes) receives rho, pressure and gap.
     """
-    phi, steps = np.empty((X.size, 3)), np.empty(X.size, dtype=np.int64)
-    status, work = np.empty(X.size, dtype=np.uint8), np.empty(core.islands_work(nodes))
+    phi = np.empty((X.size, 3))
+    steps = np.empty(X.size, dtype=np.int64)
+    status = np.empty(X.size, dtype=np.uint8)
+    work = np.empty(core.islands_work(nodes))
     bases = (*basis(nodes), *basis(COARSE_NODES))
 
     def fill(part: slice) -> None:
@@ -223,7 +223,8 @@ def solve(
     >>> bool((found.error < 1e-10).all())
     True
     """
-    approach, stiffness = finite_array("X", X), finite_array("mu", mu)
+    approach = finite_array("X", X)
+    stiffness = finite_array("mu", mu)
     require("mu", stiffness, stiffness >= 0, "at least 0")
     rtol = number_in("rtol", rtol, MIN_SOLVER_RTOL, 0.1)
     nodes = None if nodes is None else whole_number_in("nodes", nodes, 8, MAX_NODES)

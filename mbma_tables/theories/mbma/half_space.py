@@ -41,7 +41,9 @@ def gauss_legendre(n: int) -> tuple[FloatArray, FloatArray]:
     t = 2 * np.sin(theta / 2) ** 2
 
     def polynomials(t: FloatArray) -> tuple[FloatArray, FloatArray]:
-        value, previous, difference = 1 - t, np.ones_like(t), -t
+        value = 1 - t
+        previous = np.ones_like(t)
+        difference = -t
         for k in range(1, n):
             difference = (k * difference - (2 * k + 1) * t * value) / (k + 1)
             previous = value

@@ -115,14 +115,16 @@ def island(
     ['6.537', '1.322', '3.352']
     """
     E_star, units = modulus_and_units(E_star, surface)
-    delta, rule = units.number("delta", delta), get_variant(variant)
+    delta = units.number("delta", delta)
+    rule = get_variant(variant)
     named: dict[str, Any] = {
         "variant": rule.name,
         "island_model": island_model_name(island_model),
     }
     if any_labelled(surface, delta, E_star):
         raise InputError("island takes plain arrays: use .values of the DataArrays")
-    approach, modulus = positive_array("delta", delta), positive_array("E_star", E_star)
+    approach = positive_array("delta", delta)
+    modulus = positive_array("E_star", E_star)
     model = get_model(island_model, rtol, rule)
     require("delta", approach, approach >= SMALLEST_DELTA, f"at least {SMALLEST_DELTA:g}")
     broadcast_shape(delta=approach, surface=surface.h_rms, E_star=modulus)

@@ -42,18 +42,18 @@ def band_fields(
     from scipy.special import exprel
 
     with np.errstate(all="ignore"):
-        power, width = 4 - 2 * hurst, np.log1p(spread)
+        power = 4 - 2 * hurst
+        width = np.log1p(spread)
         # zeta_d^(-p), and integrals of r^(order - 2H - 1) over the band and its width
-        inverse, growth = (
-            sphere * SPHERE_FLOOR**-power,
-            [exprel((k - 2 * hurst) * width) for k in (0, 2, 4)],
-        )
+        inverse = sphere * SPHERE_FLOOR**-power
+        growth = [exprel((k - 2 * hurst) * width) for k in (0, 2, 4)]
         D = 0.75 * (growth[2] / growth[1]) / variant.density_divisor
         # alpha = 1.5 g0 g4/g2^2, Eq. (3), grouped so that nothing overflows
         narrowness = growth[1] / growth[0] * (growth[1] / growth[2])
         share = 1 - (BROADENING / 1.5 * narrowness if variant.summit_sigma else 0.0)
         sigma = np.sqrt(share * (2 * hurst * width * growth[0]))
-        scale, top = 0.75 * hurst / power, np.exp(power * width)
+        scale = 0.75 * hurst / power
+        top = np.exp(power * width)
         R_d, R_u = (RADIUS / np.sqrt(scale * (end - inverse)) for end in (1.0, top))
         mu = 8 / 3 * D * sigma * np.sqrt(2 * R_u * R_d)
         found = np.array(
@@ -213,7 +213,8 @@ class Island4dModel:
 
     def _refuse_ends(self, hurst: FloatArray, zeta_d: FloatArray) -> None:
         """Reject islands that the axes hurst and sphere do not cover."""
-        low, high = self._hurst.low, self._hurst.high
+        low = self._hurst.low
+        high = self._hurst.high
         require(
             "hurst", hurst, (hurst >= low) & (hurst <= high), f"in [{low:g}, {high:g}]"
         )
@@ -226,7 +227,8 @@ class Island4dModel:
 
         Below the table's spread log(Phi/Phi_rigid) is proportional to mu.
         """
-        axes, low = self.content.axes, self._spread.low
+        axes = self.content.axes
+        low = self._spread.low
         held = place.X, np.maximum(place.spread, low), place.sphere, place.hurst
         inside = np.all(
             [
@@ -236,7 +238,8 @@ class Island4dModel:
             axis=0,
         )
         if outside == "raise" and not inside.all():
-            spread, X = place.spread.reshape(shape), place.X.reshape(shape)
+            spread = place.spread.reshape(shape)
+            X = place.X.reshape(shape)
             require(
                 "zeta_u/zeta_d - 1",
                 spread,
@@ -269,10 +272,8 @@ class Island4dModel:
             blocks = in_blocks(
                 lambda block: self._spline(places[:, block].T).T, X.size, BLOCK
             )
-            mu, edge = (
-                place.mu[inside],
-                band_fields(spread, sphere, hurst, self.variant)[0],
-            )
+            mu = place.mu[inside]
+            edge = band_fields(spread, sphere, hurst, self.variant)[0]
             log_ratio = np.concatenate(blocks, axis=1) * np.where(
                 place.spread[inside] < low, mu / edge, 1.0
             )

@@ -13,7 +13,9 @@ from mbma_tables.theories.mbma import greenwood_tripp
 ISLAND_MODELS = ("exact", "universal", "island4d", "formula", "rigid")
 OUTSIDE = ("raise", "exact", "nan")  # options for islands that a table does not cover
 QUANTITIES = ("pressure", "area")
-MIN_RTOL, MAX_RTOL = 1e-11, 0.1  # that may be requested of totals and islands
+# that may be requested of totals and islands
+MIN_RTOL = 1e-11
+MAX_RTOL = 0.1
 CLOSED_FORM_ERROR = 1e-14
 
 

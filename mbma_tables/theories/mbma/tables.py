@@ -89,7 +89,8 @@ def get_model(island_model: str | AnyModel, rtol: float, variant: Variant) -> An
 
     A model made for one variant has the attribute `variant`.
     """
-    asked, model = number_in("rtol", rtol, models.MIN_RTOL, models.MAX_RTOL), island_model
+    asked = number_in("rtol", rtol, models.MIN_RTOL, models.MAX_RTOL)
+    model = island_model
     if isinstance(model, str) and model in models.ISLAND_MODELS:
         if model == "formula":
             from mbma_tables.theories.mbma.closed_forms import FormulaModel
@@ -140,15 +141,20 @@ class Verdict(NamedTuple):
 
 def _replay(content: TableContent) -> tuple[FloatArray, FloatArray]:
     """Results at the conformance points by the table and by the solver, each (2, points)."""
-    points, model = content.conformance, _model(content)
+    points = content.conformance
+    model = _model(content)
     if isinstance(model, UniversalModel):
-        X, mu, scales = points["X"], points["mu"], np.ones((2, 1))
+        X = points["X"]
+        mu = points["mu"]
+        scales = np.ones((2, 1))
         table = np.stack(model.answer(X, mu)[:2])
     else:
         delta, zeta_d, zeta_u, hurst = (points[name] for name in ARGUMENTS[ISLAND4D])
         table = np.stack(model.lookup(delta, zeta_d, zeta_u, hurst)[:2])
         place = to_axes(delta, zeta_d, zeta_u, hurst, model.variant)
-        X, mu, scales = place.X, place.mu, np.stack([place.force, place.area])
+        X = place.X
+        mu = place.mu
+        scales = np.stack([place.force, place.area])
     solved = greenwood_tripp.solve(X, mu, rtol=greenwood_tripp.MIN_SOLVER_RTOL)
     return table, scales * np.stack([solved.phi_F, solved.phi_A])
 

@@ -152,7 +152,8 @@ class UniversalModel(Ranged):
         ]
         ends = self._X.low, self._X.high, float(X_STEPS), self._mu.high
         numbers = np.array([*ends, first - 1, buckets.size], dtype=float)
-        starts, cells = places[0], np.concatenate(places[1:])
+        starts = places[0]
+        cells = np.concatenate(places[1:])
         # the core does not look whether places lie inside the table
         if not (
             cells.min() >= 0

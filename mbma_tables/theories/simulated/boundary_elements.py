@@ -41,7 +41,8 @@ STIFFNESS_RTOL = 1e-4
 CORRECTION = (np.pi - 1 + np.log(2)) / 24  # Yastrebov, Anciaux, Molinari 2017
 # of the boundary of the area in cell edges: elastic points beside yielded ones, and the
 # yielded area's own boundary
-MIXED, YIELDED = 0.8, 0.65
+MIXED = 0.8
+YIELDED = 0.65
 
 
 def waves(values: FloatArray, mirrored: bool = False) -> FloatArray:
@@ -76,11 +77,10 @@ def wavenumbers(
 
 def project(p: FloatArray, mean: float, cap: float) -> FloatArray:
     """The nearest pressures in [0, cap] of that mean: all shifted alike, then clipped; the shift by Newton's method."""
-    low, high = (
-        float(p.min()) - cap if np.isfinite(cap) else float(p.min()) - mean - 1,
-        float(p.max()),
-    )
-    shift, total = 0.0, mean * p.size
+    low = float(p.min()) - cap if np.isfinite(cap) else float(p.min()) - mean - 1
+    high = float(p.max())
+    shift = 0.0
+    total = mean * p.size
     for _ in range(200):
         moved = p - shift
         clipped = np.clip(moved, 0, cap)
@@ -147,14 +147,17 @@ class Contact:
             Where the tolerance is not reached.
         """
         started = time.process_time()
-        shape, cap = self.surface.shape, self.cap
+        shape = self.surface.shape
+        cap = self.cap
         p = (
             np.full(shape, force)
             if self.pressure is None
             else project(self.pressure, force, cap)
         )
         gap = self.deflect(p) - self.surface
-        direction, size, free_before = np.zeros(shape), 1.0, None
+        direction = np.zeros(shape)
+        size = 1.0
+        free_before = None
         for iteration in range(MAX_ITERATIONS):
             inside = (p > 0) & (p < cap)
             if inside.any():
@@ -180,14 +183,13 @@ class Contact:
             ) * np.where(free, direction, 0.0)
             if free_before is not None and not kept:
                 direction = np.where(free, direction - direction[free].mean(), 0.0)
-            size, free_before = new_size, free
+            size = new_size
+            free_before = free
             moved = self.deflect(direction)
             step = float(np.sum(slope * direction)) / float(np.sum(direction * moved))
             if not step > 0:
-                direction, step = (
-                    slope,
-                    new_size / float(np.sum(slope * self.deflect(slope))),
-                )
+                direction = slope
+                step = new_size / float(np.sum(slope * self.deflect(slope)))
             # held points are pushed against their bounds, so that the projection's shift
             # does not free them
             p = project(p - step * np.where(free, direction, rest), force, cap)
@@ -210,20 +212,19 @@ class Contact:
         )
 
     def _found(self, force: float, residual: float, iterations: int) -> dict[str, float]:
-        p, rest = self.traction, self._rest
-        touching, yielded = p > 0, p >= self.cap * (1 - 1e-9)
+        p = self.traction
+        rest = self._rest
+        touching = p > 0
+        yielded = p >= self.cap * (1 - 1e-9)
         elastic = touching & ~yielded
-        held, hard = self._beside(touching), self._beside(yielded)
+        held = self._beside(touching)
+        hard = self._beside(yielded)
         open_edges = np.count_nonzero(elastic & ~held)
-        mixed_edges, own_edges = (
-            np.count_nonzero(elastic & hard.any(axis=0) & ~held),
-            np.count_nonzero(yielded & ~hard),
-        )
-        raw, raw_yielded, full = (
-            float(touching.mean()),
-            float(yielded.mean()),
-            force / self.cap,
-        )
+        mixed_edges = np.count_nonzero(elastic & hard.any(axis=0) & ~held)
+        own_edges = np.count_nonzero(yielded & ~hard)
+        raw = float(touching.mean())
+        raw_yielded = float(yielded.mean())
+        full = force / self.cap
         area = raw - CORRECTION * (open_edges + MIXED * mixed_edges) / p.size
         return {
             "area": max(area, full),
@@ -257,7 +258,8 @@ class Contact:
         Pressures on the area alone, of mean 1, that move it as a whole: preconditioned
         conjugate gradients.
         """
-        shape, touching = self.surface.shape, self.traction > 0
+        shape = self.surface.shape
+        touching = self.traction > 0
         even = np.where(touching, touching.size / touching.sum(), 0.0)
 
         def inside(filter_: FloatArray) -> LinearOperator:
@@ -269,7 +271,8 @@ class Contact:
 
             return LinearOperator((touching.size, touching.size), filtered, dtype=float)
 
-        compliance, stiffness = inside(self._compliance), inside(self._stiffness)
+        compliance = inside(self._compliance)
+        stiffness = inside(self._stiffness)
         start = -compliance @ even.ravel()
         more, failed = cg(
             compliance, start, rtol=STIFFNESS_RTOL, maxiter=MAX_ITERATIONS, M=stiffness

@@ -143,7 +143,9 @@ class LoadCurve:
         """U/(A0 E*) at ln F."""
         inside, light, heavy = self._split(x)
         k = np.clip(np.searchsorted(self.x, inside, side="right") - 1, 0, self.x.size - 2)
-        force, start, end = np.exp(inside), np.exp(self.x[k]), np.exp(self.x[k + 1])
+        force = np.exp(inside)
+        start = np.exp(self.x[k])
+        end = np.exp(self.x[k + 1])
         missed = np.diff(self._work)[k] - self._integral(self.x[k], self.x[k + 1])
         work = (
             self._work[k]
@@ -177,7 +179,8 @@ def _constrained(x: FloatArray, u: FloatArray, work: FloatArray) -> CubicSpline:
     """Cubic spline of u over ln F, not-a-knot, with the integrals of u over F between loads."""
     middle = (x[1:] + x[:-1]) / 2
     knots = np.sort(np.append(x, middle))
-    at, between = np.searchsorted(knots, x), np.searchsorted(knots, middle)
+    at = np.searchsorted(knots, x)
+    between = np.searchsorted(knots, middle)
     basis = CubicSpline(knots, np.eye(knots.size))
     # each half of an interval is one polynomial
     half = np.diff(knots)[:, None] / 2

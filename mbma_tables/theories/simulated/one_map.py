@@ -32,7 +32,9 @@ from mbma_tables.theories.simulated.pressing import AREA_OF_FLOW, Press
 
 # scatter increases by this power of a map's `sensitivity_at` over that of most maps, found
 # between these A/A0
-POWER, TYPICAL, SENSITIVE = 0.75, 0.0025, (0.003, 0.95)
+POWER = 0.75
+TYPICAL = 0.0025
+SENSITIVE = (0.003, 0.95)
 # of ln A by the map's own grid at `MIN_POINTS` steps a wavelength: on a grid four times
 # finer areas are 0.8 to 1.5% larger; of the second order in the step
 GRID = 0.012
@@ -95,7 +97,8 @@ class BoundaryElements(Theory):
             pressed,
             origin,
         )
-        top, steps = float(surface.h_max), np.diff(rows)
+        top = float(surface.h_max)
+        steps = np.diff(rows)
         if not (
             (rows > 0).all()
             and (steps[:2] >= 0).all()
@@ -131,7 +134,8 @@ class BoundaryElements(Theory):
             return cls(surface, table.rows, table.points, table, table.origin)  # type: ignore[arg-type]
         whole = own_map.map_of(surface)
         assert isinstance(surface, MeasuredSurface)
-        steps, mirrored = own_map.steps_along(surface, whole), not whole.periodic
+        steps = own_map.steps_along(surface, whole)
+        mirrored = not whole.periodic
         values, points, cut = own_map.reduced(
             whole.heights - whole.heights.mean(), steps, mirrored, chosen.halvings
         )
@@ -230,7 +234,8 @@ class BoundaryElements(Theory):
     def reasons(
         self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray
     ) -> dict[str, Any]:
-        area, left_out = answer.area, self.pressed.left_out
+        area = answer.area
+        left_out = self.pressed.left_out
         coarse = f"the map's shortest wavelength has {self.points:.2g} sampling steps, fewer than {MIN_POINTS:g}"
         whole = self.surface.map
         if whole is None:
@@ -313,12 +318,11 @@ class BoundaryElements(Theory):
         for axis, (last, end, _) in enumerate(self.closing):
             passing = (gaps >= last) & (known[:, axis] > 0)
             if passing.any():
-                x, y = (
-                    np.log(gaps[passing][::-1] - end),
-                    np.log(known[passing, axis][::-1]),
-                )
+                x = np.log(gaps[passing][::-1] - end)
+                y = np.log(known[passing, axis][::-1])
                 if x.size == 1:
-                    x, y = np.append(x - 1, x), np.append(y - 3, y)
+                    x = np.append(x - 1, x)
+                    y = np.append(y - 3, y)
                 curve = PchipInterpolator(x, y)
                 with np.errstate(divide="ignore"):
                     own = np.log(np.maximum(np.minimum(u, gaps[0]) - end, 0.0))
@@ -336,7 +340,8 @@ class BoundaryElements(Theory):
     def closing(self) -> list[tuple[float, float, float]]:
         """Of both axes, u of the last open load, u1 at which it closes, and u of the first blocked load [length]."""
         gaps, known = self.flows
-        u, found = np.append(gaps, 0.0), []
+        u = np.append(gaps, 0.0)
+        found = []
         for axis, count in enumerate(np.cumprod(known[:, :2] > 0, axis=0).sum(axis=0)):
             end = blocked = float(u[count])
             if count > 1:
@@ -371,10 +376,8 @@ class BoundaryElements(Theory):
     def _within(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Mean separations of this map; bodies that are apart are at first contact."""
         for name in ("h_rms", "h_max"):
-            own, given = (
-                float(getattr(self.surface, name)),
-                np.asarray(getattr(surface, name)),
-            )
+            own = float(getattr(self.surface, name))
+            given = np.asarray(getattr(surface, name))
             good = np.abs(given - own) <= MATCHED * own
             require(
                 name,

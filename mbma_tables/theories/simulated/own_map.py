@@ -63,7 +63,9 @@ def reduced(
 
     With sampling steps along its shortest wavelength, and the cut-off in steps of the whole map.
     """
-    step, cut, halved = 1.0, 0.0, 0
+    step = 1.0
+    cut = 0.0
+    halved = 0
     while halved < halvings or values.size > MOST_POINTS:
         halved += 1
         step *= 2

@@ -28,17 +28,26 @@ from mbma_tables.theories.simulated.reynolds import flow_tensor
 
 TOLERANCE = FULL.tolerance
 LOWEST, HIGHEST = FULL.tested  # A/A0 that the loads reach at least
-MORE, LIGHTER, HEAVIER = 6, 0.5, 1.2  # loads added for that, at most, and their factors
+# loads added for that, at most, and their factors
+MORE = 6
+LIGHTER = 0.5
+HEAVIER = 1.2
 # loads added where the areas of two neighbours differ by more than this factor, at most so
 # many; where an area jumps, as when a plateau is reached, no two loads closer than this in
 # ln F
-SPACING, BETWEEN, CLOSEST = 2.5, 10, 0.1
+SPACING = 2.5
+BETWEEN = 10
+CLOSEST = 0.1
 # loads added for the flow, at most: where its logarithm falls by more than this, and where
 # an axis closes between loads further apart than this in ln F, which counts as such a fall
-FLOWS, STEEP, NARROW, CLOSING = 6, 1.2, 0.1, 3.5
+FLOWS = 6
+STEEP = 1.2
+NARROW = 0.1
+CLOSING = 3.5
 # A/A0 up to which flow along both axes was open on most maps, so that its scatter is known;
 # a fall beyond counts less
-AREA_OF_FLOW, BEYOND = 0.2, 0.6
+AREA_OF_FLOW = 0.2
+BEYOND = 0.6
 KEPT = "pressed 2"  # of what is cached: another text where this file finds other numbers
 QUANTITIES = ("area", "mean_separation", "energy")
 YIELDING = (
@@ -157,7 +166,8 @@ class Press:
             for load in wanted.tolist():
                 add(load)
             for _ in range(MORE if more else 0):
-                low, high = min(found), max(found)
+                low = min(found)
+                high = max(found)
                 # where one element touches, the solver may fail
                 if found[low][0] > LOWEST:
                     with contextlib.suppress(ConvergenceError):

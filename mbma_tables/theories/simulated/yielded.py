@@ -35,7 +35,8 @@ class Plastic(BoundaryElements):
     of_yielded_gaps = True
 
     def __init__(self, theory: BoundaryElements, cap: float) -> None:
-        known, surface = theory.pressed, theory.surface
+        known = theory.pressed
+        surface = theory.surface
         assert isinstance(known, Press)
         elastic = own_map.law_loads(surface, AREAS)
         loads = ((cap * np.array(AREAS)) ** -2 + elastic**-2) ** -0.5
@@ -81,7 +82,8 @@ class Plastic(BoundaryElements):
         """Force, area and stiffness; heavier contacts go over to the hardness everywhere."""
         last = self.rows[2, -1]
         inside = super().answer(surface, np.maximum(mean_separation, last))
-        left, beyond = (mean_separation / last) ** self._power, mean_separation < last
+        left = (mean_separation / last) ** self._power
+        beyond = mean_separation < last
         pressure, area = (
             end - rest * left for end, rest in zip(self._ends, self._last, strict=True)
         )

@@ -19,14 +19,12 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.bearing_curve import FRACTIONS
 
-IMAGES, TERMS = (
-    0.06,
-    10,
-)  # tau below which images converge faster than a series; its terms, and one
-SHARPEST, NARROW = (
-    1e-200,
-    3e-3,
-)  # least tau; half-width over which a difference goes by powers
+# tau below which images converge faster than a series; its terms, and one
+IMAGES = 0.06
+TERMS = 10
+# least tau; half-width over which a difference goes by powers
+SHARPEST = 1e-200
+NARROW = 3e-3
 SEEN = 6.0  # above which erfc is below rounding of 1
 MOST_SHARE = 0.9  # largest share of a map's heights in one node
 DEPTH = 30.0  # deepest valleys below the last node, in levels
@@ -42,7 +40,9 @@ LEAST_GAP = 1e-300  # mean gap at which all heights lie above the level
 SHARPNESS = 8.0
 NEGLIGIBLE = 1e-17  # part of the larger one's odds that does not change its last digit
 FULLEST = 1 - 1e-12  # largest share of elastic contact, whose odds are finite
-MOST_ETA, MOST_RATIO = 1e100, 1e300  # larger values give the same force
+# larger values give the same force
+MOST_ETA = 1e100
+MOST_RATIO = 1e300
 ROOT_TWO_PI = np.sqrt(2 * np.pi)
 
 
@@ -75,7 +75,8 @@ def area(
     yielded: bool = False,
 ) -> FloatArray:
     """A/A0, or its yielded part, at F/(A0 E* g), at most eta, from the elastic A/A0 there; above 1 only if that is."""
-    given, c = (force, erfinv(np.minimum(elastic_area, 1.0)), eta), constants
+    given = (force, erfinv(np.minimum(elastic_area, 1.0)), eta)
+    c = constants
     if yielded:
         return answered(_area, given, 1, c.yield_power, c.yield_scale, True)[0]
     return answered(_area, given, 1, c.area_power, c.area_scale, False)[0] * np.maximum(
@@ -96,7 +97,8 @@ def _area(
     """A/A0, or its yielded part, at F/(A0 E* g) by e, erf(e) being the elastic A/A0 there."""
     x = np.minimum(force / eta, 1.0)
     # tau of the elastic contact and of the hardness alone
-    half, limit = 0.5 * x / e, 0.125 / (scale * np.sqrt(eta))
+    half = 0.5 * x / e
+    limit = 0.125 / (scale * np.sqrt(eta))
     elastic = half * half
     small = np.minimum(elastic, limit)
     joint = np.exp(
@@ -127,20 +129,22 @@ def diffused(
     reach = x * over if reach is None else reach
     wide = tau >= IMAGES
     if sign > 0:
-        found, seen = erf(reach), ~wide & (2 * over - reach < SEEN)
+        found = erf(reach)
+        seen = ~wide & (2 * over - reach < SEEN)
         if seen.any():
             found[seen] += _difference(2 * over[seen], reach[seen])
     else:
         found = _difference(over, reach) + _difference(3 * over, reach)
     if wide.any():
-        own, first = x[wide], np.exp(-(np.pi**2) * tau[wide])
+        own = x[wide]
+        first = np.exp(-(np.pi**2) * tau[wide])
         # sign^n sin(n pi x), and exp(-n^2 pi^2 tau) by the odd powers between the squares
-        before, sine, twice = (
-            np.zeros_like(own),
-            sign * np.sin(np.pi * own),
-            2 * sign * np.cos(np.pi * own),
-        )
-        odd, factor, total = first, first, np.zeros_like(own)
+        before = np.zeros_like(own)
+        sine = sign * np.sin(np.pi * own)
+        twice = 2 * sign * np.cos(np.pi * own)
+        odd = first
+        factor = first
+        total = np.zeros_like(own)
         for n in range(1, TERMS):
             total = total + sine * factor / n
             before, sine, odd = sine, twice * sine - before, odd * first * first
@@ -151,7 +155,8 @@ def diffused(
 
 def _difference(centre: FloatArray, half: FloatArray) -> FloatArray:
     """erfc(centre - half) - erfc(centre + half); by powers where that would cancel."""
-    a, b = (half * centre) ** 2, half**2
+    a = (half * centre) ** 2
+    b = half**2
     series = 1 + (2 * a - b) / 3 + (a * (2 / 3 * a - 2 * b) + b * b / 2) / 5
     narrow = half * np.maximum(centre, 1.0) < NARROW
     cancelled = 4 / np.sqrt(np.pi) * half * np.exp(-centre * centre) * series
@@ -179,12 +184,10 @@ def force(
     exp(-2 eta^2) whose pressure in a light contact is below the hardness. So a hard contact
     is the elastic one, and a soft one follows the heights alone.
     """
-    own, heights, cap, c = (
-        np.asarray(elastic_force),
-        np.asarray(share),
-        np.asarray(eta),
-        constants,
-    )
+    own = np.asarray(elastic_force)
+    heights = np.asarray(share)
+    cap = np.asarray(eta)
+    c = constants
     unyielded = -np.expm1(-2 * np.minimum(cap, MOST_ETA) ** 2)
     covered = np.minimum(unyielded * erf(np.sqrt(2) * own), FULLEST)
     covered_rate = -unyielded * np.sqrt(8 / np.pi) * np.exp(-2 * own * own) * stiffness
@@ -218,7 +221,8 @@ def force(
     elastic_rate = np.where(own < np.inf, by_elastic * stiffness / own, 0.0)
     rate = elastic_rate - np.where(by_level > 0, by_level * slope_of_Q, 0.0)
     # without contact the force is zero
-    touching, rest = small > 0, np.where(cap > 0, small, np.nan)
+    touching = small > 0
+    rest = np.where(cap > 0, small, np.nan)
     found = np.where(touching, small * np.exp(-lower), rest)
     return found, np.where(touching, found * rate, rest)
 
@@ -254,7 +258,8 @@ def plane_separation(
     u: ArrayLike, load: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS
 ) -> FloatArray:
     """Gap between mean planes [h_rms] at mean gap u and x = F/(p_m A0): less the flattening of yielded points."""
-    x, cap = np.asarray(load, float), np.asarray(eta, float)
+    x = np.asarray(load, float)
+    cap = np.asarray(eta, float)
     d = -ndtri(x)
     with np.errstate(invalid="ignore"):
         flattened = np.where(x > 0, np.exp(-d * d / 2) / np.sqrt(2 * np.pi) - d * x, 0.0)
@@ -268,9 +273,12 @@ def bearing_share(
     u: ArrayLike, h_max: ArrayLike | None = None
 ) -> tuple[FloatArray, FloatArray]:
     """Q(u), share of Gaussian heights above the level of mean gap u [h_rms], and dQ/du; with `h_max` it ends there."""
-    gap, last = np.asarray(u, float), np.asarray(np.inf if h_max is None else h_max)
-    d, end = _levels(gap), _level_at_end(last.item()) if last.size == 1 else _levels(last)
-    below, whole = ndtr(d), ndtr(end)
+    gap = np.asarray(u, float)
+    last = np.asarray(np.inf if h_max is None else h_max)
+    d = _levels(gap)
+    end = _level_at_end(last.item()) if last.size == 1 else _levels(last)
+    below = ndtr(d)
+    whole = ndtr(end)
     share = np.maximum(np.where(end > 0, ndtr(-d) - ndtr(-end), whole - below), 0.0)
     slope = np.where(
         gap <= LEAST_GAP, -np.inf, np.exp(-d * d / 2) / (-ROOT_TWO_PI * below)
@@ -311,7 +319,8 @@ class BearingCurve:
         gap = level * (1 - share) + np.interp(share, FRACTIONS, above)
         # the smallest shares are single points, so nodes must not be as close; the last
         # node ends at the valleys
-        kept, last = np.zeros(gap.size, bool), h_max
+        kept = np.zeros(gap.size, bool)
+        last = h_max
         for k, own in enumerate(gap):
             if 0 < own < (1 - MIN_SPACING) * last and share[k] < MOST_SHARE:
                 kept[k], last = True, own
@@ -325,7 +334,8 @@ class BearingCurve:
             h_max,
         )
         # against Gaussian heights; valleys below the last node as deep as theirs
-        level, own = _levels(gap[kept][::-1]), -ndtri(share[kept][::-1])
+        level = _levels(gap[kept][::-1])
+        own = -ndtri(share[kept][::-1])
         self._deepest = float(level[0]) - DEPTH
         self._level = PchipInterpolator(
             np.append(self._deepest, level), np.append(own[0] - DEPTH, own)
@@ -337,12 +347,11 @@ class BearingCurve:
         gap = np.asarray(u, float)
         d = np.maximum(_levels(np.clip(gap, 0.0, self._top)), self._deepest)
         own = self._level(d)
-        share, slope = (
-            ndtr(-own),
-            -np.exp(-own * own / 2) / np.sqrt(2 * np.pi) * self._rate(d) / ndtr(d),
-        )
+        share = ndtr(-own)
+        slope = -np.exp(-own * own / 2) / np.sqrt(2 * np.pi) * self._rate(d) / ndtr(d)
         steep = -self._lightest / (self._h_max - self._top)
-        light, rest = gap > self._top, np.maximum(self._h_max - gap, 0.0)
+        light = gap > self._top
+        rest = np.maximum(self._h_max - gap, 0.0)
         return np.where(light, -steep * rest, share), np.where(
             light, np.where(rest > 0, steep, 0.0), slope
         )

@@ -22,10 +22,9 @@ GROUP = "hardness"  # group of the calibrated laws' file
 QUANTITIES = ("area", "yielded", "pressure", "unloading_stiffness")
 REACHED = 1e-9  # relative, of forces at full compression
 HEAVIEST = 1e6  # F/(A0 E* g) above which areas are those of full contact
-CLOSED, LEAST = (
-    1e-9,
-    1e-300,
-)  # u/h_rms of contacts that count as full, and u of those of surfaces that end at h_max
+# u/h_rms of contacts that count as full, and u of those of surfaces that end at h_max
+CLOSED = 1e-9
+LEAST = 1e-300
 MANY = 200  # most hardnesses for which inversions use as many gaps as without
 ROUNDING = 1e-9  # relative, of numbers beside the ends of ranges
 # nominal pressure over the hardness from which the bulk yields: D. Tabor, The Hardness of
@@ -195,7 +194,8 @@ class Yielding(Theory):
         lighter: FloatArray | None = None,
     ) -> Loaded:
         """The answer at mean separations u [length]; `lighter` are those of the elastic contact at the same forces."""
-        u, h_rms = np.asarray(mean_separation, dtype=float), np.asarray(surface.h_rms)
+        u = np.asarray(mean_separation, dtype=float)
+        h_rms = np.asarray(surface.h_rms)
         at_force: Any = None
         if lighter is None:
             elastic = self.elastic.answer(surface, u)
@@ -205,7 +205,8 @@ class Yielding(Theory):
                 TheoryAnswer(*(part[k] for part in both)) for k in range(2)
             )
         eta, closed = self._closed(surface)
-        gradient, endless = np.asarray(surface.rms_gradient), np.isinf(self.hardness)
+        gradient = np.asarray(surface.rms_gradient)
+        endless = np.isinf(self.hardness)
         if endless.all():
             return Loaded(
                 u, h_rms, eta, elastic.pressure / gradient, elastic, elastic, elastic.area
@@ -261,7 +262,8 @@ class Yielding(Theory):
         """Force without the area, which is computed from it."""
         if quantity != "pressure":
             return super().curve(surface, quantity)
-        elastic, closed = self.elastic.curve(surface, quantity), self._closed(surface)[1]
+        elastic = self.elastic.curve(surface, quantity)
+        closed = self._closed(surface)[1]
 
         def values(u: FloatArray) -> tuple[Any, Any, bool]:
             pressure, steep, exact = elastic(u)

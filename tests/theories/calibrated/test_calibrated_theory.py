@@ -211,8 +211,10 @@ def test_surfaces_with_a_plateau_by_their_own_spectrum(number, top):
     force, area, _, u = np.loadtxt(DATA / f"rolloff_{number}.csv", delimiter=",").T[:4]
     rows = np.loadtxt(DATA / "rolloff_spectra.csv", delimiter=",", skiprows=2)
     _, q, variance = rows[rows[:, 0] == number].T
-    spectrum, h_rms = Spectrum.from_shares(q, variance), np.sqrt(variance.sum())
-    law, g = Law(spectrum, top / h_rms), spectrum.gradient * h_rms
+    spectrum = Spectrum.from_shares(q, variance)
+    h_rms = np.sqrt(variance.sum())
+    law = Law(spectrum, top / h_rms)
+    g = spectrum.gradient * h_rms
     touching = area > 0.002
     for quantity, found, exact in (
         ("area", law.area(force / g), area),
@@ -230,10 +232,8 @@ def test_surfaces_with_a_plateau_by_their_own_spectrum(number, top):
 
 def synthetic():
     k = np.hypot(np.fft.fftfreq(192, 1 / 192)[:, None], np.arange(97)[None, :])
-    inside, phases = (
-        (k >= 3) & (k <= 40),
-        np.exp(2j * np.pi * np.random.default_rng(4).random(k.shape)),
-    )
+    inside = (k >= 3) & (k <= 40)
+    phases = np.exp(2j * np.pi * np.random.default_rng(4).random(k.shape))
     heights = np.fft.irfft2(
         np.where(inside, np.where(inside, k, 1.0) ** -1.8 * phases, 0)
     )
@@ -307,7 +307,8 @@ class TestSpectrum:
         q = np.geomspace(SURFACE.q0, SURFACE.q1, count)
         surface = Surface.from_spectrum(q, SURFACE.power_spectrum(q), h_max=SURFACE.h_max)
         u = SHARES[1:] * SURFACE.h_max
-        mine, tables = THEORY.answer(surface, u), THEORY.answer(SURFACE, u)
+        mine = THEORY.answer(surface, u)
+        tables = THEORY.answer(SURFACE, u)
         bound = 3 * (float(np.max(tables.error)) + float(np.max(mine.error)))
         for name, times in (("pressure", 1), ("area", 1), ("stiffness", 3)):
             np.testing.assert_allclose(
@@ -438,16 +439,15 @@ def test_loads_of_surfaces_with_a_peak_far_out(h_max, entries):
     ("hurst", "zeta_1", "top"), [(0.3, 30.0, 2.0), (0.8, 1000.0, 5.0)]
 )
 def test_errors_hold_next_to_last_contact(hurst, zeta_1, top):
-    surface, law = (
-        Surface(hurst, 1.0, zeta_1, 1.0, top),
-        Law(Spectrum.self_affine(hurst, zeta_1), top),
-    )
+    surface = Surface(hurst, 1.0, zeta_1, 1.0, top)
+    law = Law(Spectrum.self_affine(hurst, zeta_1), top)
     nodes, weights = np.polynomial.legendre.leggauss(12)
     u = top * (1 - 10.0 ** -np.arange(1.5, 13))
     found = contact(surface, mean_separation=u, theory="calibrated")
     # stiffness, which nothing cancels in, integrated over the root of the depth, which it
     # begins with
-    depth, root = (top - u)[:, None], (1 + nodes) / 2
+    depth = (top - u)[:, None]
+    root = (1 + nodes) / 2
     stiffness = law.contact((top - depth * root**2).ravel())[2].reshape(u.size, -1)
     exact = surface.rms_gradient * (stiffness * depth * root) @ weights
     assert (np.abs(found.pressure / exact - 1) <= found.error).all()
@@ -491,7 +491,8 @@ def test_published_simulations(rows, gradient):
     )
     force, area, gap = np.array(rows).T
     force = force / gradient
-    s0, t = min(0.497 + 0.041 * math.log(law.spectrum.alpha / 10), 0.95), force / 0.321
+    s0 = min(0.497 + 0.041 * math.log(law.spectrum.alpha / 10), 0.95)
+    t = force / 0.321
     before = erf(math.sqrt(2) * force / np.sqrt((s0 + t) / (1 + t)))
     assert np.all(np.abs(law.area(force) - area) <= np.abs(before - area))
     scatter = shipped_deviations().standard_deviation("calibrated", "pressure", area)
@@ -517,7 +518,8 @@ EDGES = ((0.1, 3.001), (0.1, 1e5), (1.0, 3.001), (1.0, 1e5))
 
 @pytest.mark.parametrize("edge", [None, *EDGES])
 def test_no_gap_is_beyond_its_stated_error(edge):
-    rng, count = np.random.default_rng(7), 300 if edge is None else 60
+    rng = np.random.default_rng(7)
+    count = 300 if edge is None else 60
     for _ in range(count):
         hurst, zeta_1 = edge or (
             rng.uniform(0.1, 1.0),

@@ -21,7 +21,9 @@ from mbma_tables.theories.mbma.variants import get_variant
 def brute(surface, separation, variant):
     """(48) and (49) in units of E* q0 s and 1, by composite Gauss rules far finer than needed."""
     rule = get_variant(variant)
-    hurst, zeta_1, h_rms = surface.hurst, surface.zeta_1, surface.h_rms
+    hurst = surface.hurst
+    zeta_1 = surface.zeta_1
+    h_rms = surface.h_rms
     room = h_rms / surface.s
     reach = (surface.h_max - separation) / h_rms
     layer = zeta_1**-hurst
@@ -110,10 +112,8 @@ def test_the_papers_yang_persson_case():
 
 @pytest.mark.parametrize("island_model", ["exact", "rigid"])
 def test_no_contact_is_exactly_zero(island_model):
-    surface, separation = (
-        one_surface(0.8, 216.0),
-        np.array([3.0, math.nextafter(3, 4), 50.0, 1e300]),
-    )
+    surface = one_surface(0.8, 216.0)
+    separation = np.array([3.0, math.nextafter(3, 4), 50.0, 1e300])
     found = contact(
         surface, separation=separation, theory=Mbma(island_model=island_model)
     )

@@ -21,7 +21,8 @@ from mbma_tables.theories.mbma.greenwood_tripp import height_integral
 from mbma_tables.theories.mbma.tables import universal_model
 from mbma_tables.theories.mbma.variants import VARIANTS, get_variant
 
-STEP, FAR = 1e-9, 1e-5
+STEP = 1e-9
+FAR = 1e-5
 EPS = np.finfo(float).eps
 INPUTS = ("hurst", "q0", "q1", "h_rms", "h_max", "separation")
 SOLVER_RTOL = 1e-10
@@ -144,7 +145,8 @@ def test_totals_do_not_jump(variant, which, island_model, rtol, count):
 def level_changes(rng, count, rtol):
     """X and mu where the solver goes over to more nodes: by X in the first half, by mu in the other."""
     digits = -math.log10(rtol)
-    X, mu = rng.uniform(-5, 38, count), 10 ** rng.uniform(-12, 6, count)
+    X = rng.uniform(-5, 38, count)
+    mu = 10 ** rng.uniform(-12, 6, count)
     level = rng.choice(greenwood_tripp.LEVELS[greenwood_tripp.LEVELS < 100], count)
     softness = 1 + np.log10(np.maximum(mu, 1)) / 12
     by_X = (level / (digits * softness)) ** 2 - 5
@@ -160,10 +162,8 @@ def level_changes(rng, count, rtol):
 def two_numbers(rng, count):
     """X and mu at random, at edges of the table's cells, where the height integrals change their piece, and at 1."""
     X_axis = universal_model().content.axes[0]
-    X, mu = (
-        rng.uniform(X_axis.low + 1e-3, X_axis.high - 1e-3, count),
-        10 ** rng.uniform(-12, 6, count),
-    )
+    X = rng.uniform(X_axis.low + 1e-3, X_axis.high - 1e-3, count)
+    mu = 10 ** rng.uniform(-12, 6, count)
     edges = universal_model().content.auxiliary
     X[1::6] = rng.choice(np.setdiff1d(edges["X_low"][1], [0.0, X_axis.low]), X[1::6].size)
     mu[2::6] = rng.choice(edges["mu_low"][1][edges["mu_low"][1] > 0], mu[2::6].size)
@@ -187,7 +187,8 @@ def islands_apart(answer, X, mu, which, room=1e-4):
     ]
     for name in ("phi_F", "phi_A"):
         moved = STEP / (2 * FAR) * np.log(getattr(ends[1], name) / getattr(ends[0], name))
-        a, b = getattr(one, name), getattr(other, name)
+        a = getattr(one, name)
+        b = getattr(other, name)
         assert (
             apart(a, b, moved) <= one.error + other.error + room * np.abs(moved)
         ).all(), name
@@ -234,7 +235,8 @@ def test_the_solver_joins_the_rigid_sphere():
 
 @pytest.mark.parametrize("side", ["X low", "X high", "mu high"])
 def test_the_solver_takes_over_from_the_universal_table(side):
-    count, rng = 60 * SCALE, np.random.default_rng(13)
+    count = 60 * SCALE
+    rng = np.random.default_rng(13)
     axes = dict(zip(("X", "mu"), universal_model().content.axes, strict=True))
     numbers = {"X": rng.uniform(-5, 40, count), "mu": 10 ** rng.uniform(-10, 6, count)}
     which, end = side.split()
@@ -335,7 +337,8 @@ def changed(numbers, which, value):
 @pytest.mark.parametrize("which", INPUTS)
 def test_totals_do_not_bend_at_the_floor_of_zeta_u(which, rule):
     """At that of zeta_d K1 switches; both sides of it are compared with differences in test_sensitivity.py."""
-    count, rng = 8 * SCALE, np.random.default_rng([4, INPUTS.index(which)])
+    count = 8 * SCALE
+    rng = np.random.default_rng([4, INPUTS.index(which)])
     hurst, zeta_1, h_max = smooth_surfaces(rng, count)
     # pressed to this floor, rougher ones leave the table
     hurst = np.maximum(hurst, 0.45)

@@ -18,12 +18,16 @@ from mbma_tables.theories.mbma.greenwood_tripp import (
 )
 from mbma_tables.theories.mbma.half_space import basis
 
-OK, UNRESOLVED, INVALID = 0, 4, 5
+OK = 0
+UNRESOLVED = 4
+INVALID = 5
 
 
 def solve(X, mu, nodes, rtol=1e-10):
-    X, mu = np.ascontiguousarray(X, dtype=float), np.ascontiguousarray(mu, dtype=float)
-    phi, steps = np.zeros((X.size, 3)), np.zeros(X.size, dtype=np.int64)
+    X = np.ascontiguousarray(X, dtype=float)
+    mu = np.ascontiguousarray(mu, dtype=float)
+    phi = np.zeros((X.size, 3))
+    steps = np.zeros(X.size, dtype=np.int64)
     status = np.full(X.size, 99, dtype=np.uint8)
     kept = np.zeros((3, X.size, nodes))
     bases = (*basis(nodes), *basis(COARSE_NODES))
@@ -94,7 +98,8 @@ EDGES = [-8.0, -6.0, -4.0, -2.0, 0.0, 1.0, 4.0]  # where the pieces meet
 
 def reference(n: float, x: float) -> mp.mpf:
     with mp.workdps(40):
-        order, at = mp.mpf(n), mp.mpf(float(x))
+        order = mp.mpf(n)
+        at = mp.mpf(float(x))
         scale = mp.gamma(order + 1) / mp.sqrt(2 * mp.pi)
         return scale * mp.exp(-at * at / 4) * mp.pcfu(order + mp.mpf(1) / 2, at)
 

@@ -27,7 +27,8 @@ def one_geometry(approach, hurst, zeta_1, variant):
 @pytest.mark.parametrize("name", VARIANTS)
 def test_against_sixty_digits(name):
     surfaces = random_surfaces(700, seed=len(name), hurst=(0.05, 1))
-    hurst, zeta_1 = surfaces.hurst, surfaces.zeta_1
+    hurst = surfaces.hurst
+    zeta_1 = surfaces.zeta_1
     hurst = np.where(np.arange(700) % 23 == 5, math.nextafter(1, 0), hurst)
     approach = 10 ** np.random.default_rng(len(name)).uniform(-12, 1, 700)
     found = one_geometry(approach, hurst, zeta_1, VARIANTS[name])
@@ -86,10 +87,8 @@ def exact(spread, sphere, hurst, summits):
         for zeta in (zeta_d, zeta_u)
     )
     mu = 8 * D * sigma * mpmath.sqrt(2 * R_u * R_d) / 3
-    force, area = (
-        sigma * mpmath.sqrt(2 * R_d * sigma),
-        2 * mpmath.pi * D * R_u * R_d * sigma**2,
-    )
+    force = sigma * mpmath.sqrt(2 * R_d * sigma)
+    area = 2 * mpmath.pi * D * R_u * R_d * sigma**2
     return mu, sigma * zeta_d**H, force * zeta_d ** (1 + H), area * zeta_d**2
 
 
@@ -140,7 +139,8 @@ def test_units(surface, variant):
         found = island(surface, approach * surface.h_rms, variant=variant)
         exact = exact_island(approach, surface.hurst, surface.zeta_1, divisor(variant))
         # the unit of height and of length that the paper's geometry is in
-        s, length = surface.s, 1 / surface.q0
+        s = surface.s
+        length = 1 / surface.q0
         units = {
             "R_d": length**2 / s,
             "R_u": length**2 / s,

@@ -104,7 +104,11 @@ def test_smooth_hertz_is_approached(mu):
 
 
 def test_published_codes():
-    E_star, sigma, density, R_u, R_d = 1.1538e11, 20e-6, 2e8, 30e-6, 10e-3
+    E_star = 1.1538e11
+    sigma = 20e-6
+    density = 2e8
+    R_u = 30e-6
+    R_d = 10e-3
     mu = 8 / 3 * density * sigma * math.sqrt(2 * R_u * R_d)
     L = math.sqrt(2 * R_d * sigma)
     with PUBLISHED.open() as lines:
@@ -138,7 +142,9 @@ def test_rising_with_stiffness_and_below_rigid(X, mu, factor):
 )
 def test_profiles(X, mu):
     solved = greenwood_tripp.solve(X, mu, rtol=1e-11)
-    rho, pressure, gap = solved.rho, solved.pressure, solved.gap
+    rho = solved.rho
+    pressure = solved.pressure
+    gap = solved.gap
     assert rho.shape == pressure.shape == gap.shape == (solved.nodes,)
     law = mu / 2 * height_integral(1.5, gap)
     felt = pressure > 1e-6 * pressure.max()
@@ -222,10 +228,8 @@ OTHERS = pytest.mark.skipif(
 @pytest.fixture(scope="module")
 def theirs():
     """The function of the notebook that compares both programs."""
-    page, names = (
-        pathlib.Path(__file__).parents[3] / "docs" / "tutorials" / "other_program.md",
-        {},
-    )
+    page = pathlib.Path(__file__).parents[3] / "docs" / "tutorials" / "other_program.md"
+    names = {}
     exec(
         page.read_text(encoding="utf-8")
         .partition("```{code-cell}\n")[2]
@@ -263,7 +267,8 @@ def test_pressures_of_the_package_contactmechanics(theirs):
     ("X", "mu"), [(5.0, 0.01), (5.0, 1.0), (2.0, 0.5), (5.0, 3.0), (0.0, 4.0)]
 )
 def test_the_damped_iteration_errs_like_the_square_of_the_ring_width(X, mu):
-    exact, error = greenwood_tripp.solve(X, mu, rtol=1e-12), []
+    exact = greenwood_tripp.solve(X, mu, rtol=1e-12)
+    error = []
     for rings in (50, 100, 200, 400):
         _, converged, phi_F, phi_A = iterated(X, mu, ring_matrix(rings), 1e-10)
         assert converged

@@ -19,7 +19,9 @@ def small():
 
 
 def test_edges_to_the_last_bit(small):
-    delta, zeta_d, zeta_u = 1.5, 2.0, 20.0
+    delta = 1.5
+    zeta_d = 2.0
+    zeta_u = 20.0
     for hurst in (0.3, 1.0):
         small.lookup(delta, zeta_d, zeta_u, hurst)
     for hurst in (np.nextafter(0.3, 0), np.nextafter(1.0, 2)):
@@ -111,7 +113,9 @@ def test_words_for_outside(kind):
         asked(*given, outside="clamp")
 
 
-ZETA_D, HURST, X = 3.7, 0.8, 3.0
+ZETA_D = 3.7
+HURST = 0.8
+X = 3.0
 
 
 def narrow_island(spread):
@@ -124,10 +128,8 @@ def narrow_island(spread):
 @pytest.mark.parametrize("power", range(-12, -1))
 def test_narrow_bands(power):
     raw, place = narrow_island(10.0**power)
-    found, solved = (
-        open_table("island4d").lookup(*raw),
-        greenwood_tripp.solve(place.X, place.mu, rtol=1e-10),
-    )
+    found = open_table("island4d").lookup(*raw)
+    solved = greenwood_tripp.solve(place.X, place.mu, rtol=1e-10)
     for hat, scale, phi in (
         (found.F_hat, place.force, solved.phi_F),
         (found.A_hat, place.area, solved.phi_A),

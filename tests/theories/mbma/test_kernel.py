@@ -54,12 +54,11 @@ def totals(hurst, zeta_1, compression, peak, rtol=1e-9):
     arrays = np.broadcast_arrays(
         *(np.atleast_1d(np.asarray(x, float)) for x in (hurst, zeta_1, compression, peak))
     )
-    numbers, count = [np.ascontiguousarray(array) for array in arrays], arrays[0].size
-    out, error, status = (
-        np.empty((count, 2, 2)),
-        np.empty(count),
-        np.empty(count, np.uint8),
-    )
+    numbers = [np.ascontiguousarray(array) for array in arrays]
+    count = arrays[0].size
+    out = np.empty((count, 2, 2))
+    error = np.empty(count)
+    status = np.empty(count, np.uint8)
     own = REPORTED.numbers, *universal_model().cells
     bad = core.totals(*numbers, rtol, *own, out, error, status, np.empty(1, np.int64))
     assert bad == (status != OK).sum()
@@ -116,7 +115,8 @@ def test_bits_depend_neither_on_the_batch_nor_on_the_generation(generations):
     whole = totals(*given)[0]
     for k in range(0, 300, 37):
         assert totals(*(x[k] for x in given))[0].tobytes() == whole[k].tobytes()
-    X, mu = rng.uniform(-6, 40, 500), 10 ** rng.uniform(-10, 6, 500)
+    X = rng.uniform(-6, 40, 500)
+    mu = 10 ** rng.uniform(-10, 6, 500)
     phi = []
     for one in generations:
         phi.append(np.empty((500, 3)))

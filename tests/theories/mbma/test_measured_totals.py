@@ -67,7 +67,8 @@ def test_errors_hold_and_slopes_are_slopes(seed, share):
     model = get_model("universal", 1e-8, REPORTED)
     coarse, fine = (profile(surface, model, REPORTED, rtol) for rtol in (1e-5, 1e-10))
     c = share * np.array([1e-5, 0.1, 1.0])
-    one, two = coarse.totals(c), fine.totals(c, slopes=True)
+    one = coarse.totals(c)
+    two = fine.totals(c, slopes=True)
     assert (np.abs(one / two[:2] - 1) <= coarse.error + fine.error).all()
     step = 1e-4 * c
     slopes = (fine.totals(c + step) - fine.totals(c - step)) / (2 * step)
@@ -77,8 +78,10 @@ def test_errors_hold_and_slopes_are_slopes(seed, share):
 def test_slopes_hold_in_thin_panels():
     # values of 5,000 samples round there to more than they change: against the integral and
     # its upper limit in numpy
-    surface, model = rough(count=5000), get_model("universal", 1e-8, REPORTED)
-    kept, source = profile(surface, model, REPORTED, 1e-10), source_of(surface, REPORTED)
+    surface = rough(count=5000)
+    model = get_model("universal", 1e-8, REPORTED)
+    kept = profile(surface, model, REPORTED, 1e-10)
+    source = source_of(surface, REPORTED)
     node, weight = np.polynomial.legendre.leggauss(8)
 
     def parts(x):
@@ -117,7 +120,8 @@ def test_slopes_hold_in_thin_panels():
 @pytest.mark.parametrize(("count", "h_max"), [(60, 3.5), (2000, 3.5), (60, 13.0)])
 def test_a_law_is_the_contacts(count, h_max):
     surface = rough(count=count, h_max=h_max)
-    law, d = contact_law(surface, theory="mbma"), surface.h_max * (1 - DEPTHS)
+    law = contact_law(surface, theory="mbma")
+    d = surface.h_max * (1 - DEPTHS)
     d = d[d >= law.lowest]
     found = contact(surface, separation=d, theory="mbma")
     for name in ("pressure", "area"):
@@ -158,7 +162,8 @@ def test_a_law_ends_with_the_table():
 def test_islands():
     surface = five_numbers()
     delta = [0.01, 0.5, 2.0, 8.0]
-    one, two = island(surface, delta), island(sampled(surface, 30), delta)
+    one = island(surface, delta)
+    two = island(sampled(surface, 30), delta)
     for field in dataclasses.fields(one):
         value = getattr(one, field.name)
         if isinstance(value, np.ndarray) and field.name != "error":

@@ -38,7 +38,8 @@ def refused(path, kind=None):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_damaged_bytes_never_reach_the_library(kind, sources, tmp_path):
-    content, rng = sources[kind], np.random.default_rng(8)
+    content = sources[kind]
+    rng = np.random.default_rng(8)
     path = tmp_path / f"{kind}.nc"
     in_the_seal = (
         content[:k] + bytes([content[k] ^ 1 << k % 8]) + content[k + 1 :]
@@ -97,7 +98,8 @@ def edits(content):
 
 
 def test_edits_under_a_right_checksum(sources, tmp_path):
-    kind, done = UNIVERSAL, 0
+    kind = UNIVERSAL
+    done = 0
     for done, edit in enumerate(edits(sources[kind])):
         path = edited(tmp_path / f"{kind}.nc", sources[kind], edit)
         assert refused(path, kind if done % 2 else None), edit
@@ -105,7 +107,8 @@ def test_edits_under_a_right_checksum(sources, tmp_path):
 
 
 def test_variables_left_out_or_in_another_type(sources, tmp_path):
-    kind, path = UNIVERSAL, tmp_path / "universal.nc"
+    kind = UNIVERSAL
+    path = tmp_path / "universal.nc"
     # as it is, the copy opens: what is refused below is the change
     assert read_table(copied(path, sources[kind]), kind).kind == kind
     with netCDF4.Dataset("table", memory=unseal(sources[kind])) as dataset:

@@ -49,7 +49,8 @@ def random_positions(shape, count, seed=2):
 
 def test_tensor_splines_are_those_of_scipy():
     values = node_values(SHAPE)
-    coefs, spline = coefficients(values, 3, 4), by_scipy(values, 3, 4)
+    coefs = coefficients(values, 3, 4)
+    spline = by_scipy(values, 3, 4)
     assert coefs.shape == (*(n + 2 for n in SHAPE), 2)
     positions = random_positions(SHAPE, 500)
     points = np.stack(positions, axis=-1)

@@ -43,10 +43,8 @@ def test_the_smallest_mu_and_the_rigid_limit():
     mu = 10 ** rng.uniform(-30, -8, 300)
     error, bound = error_and_bound(model, X, mu)
     assert (error <= bound).all()
-    rigid, found = (
-        greenwood_tripp.rigid_sphere(X, np.full(300, 1e-200)),
-        model.answer(X, np.full(300, 1e-200)),
-    )
+    rigid = greenwood_tripp.rigid_sphere(X, np.full(300, 1e-200))
+    found = model.answer(X, np.full(300, 1e-200))
     assert (np.abs(np.stack(found[:2]) / rigid - 1) <= found.error).all()
     np.testing.assert_array_equal(model.answer(X, np.zeros(300)).phi_F, 0)
 
@@ -77,7 +75,8 @@ def test_every_cell_answers_with_its_own_series_and_error(small):
     for cell, (X_low, X_high, mu_low, mu_high) in enumerate(zip(*edges, strict=True)):
         middle = np.sqrt(mu_low * mu_high)
         for share in (1e-9, 0.5, 1 - 1e-9):
-            X, mu = X_low + share * (X_high - X_low), mu_low + share * (mu_high - mu_low)
+            X = X_low + share * (X_high - X_low)
+            mu = mu_low + share * (mu_high - mu_low)
             ratio = 2 * mu / mu_high - 1
             if mu_low > 0:
                 slope = (np.sqrt(mu_high) + np.sqrt(mu_low)) / (
@@ -164,7 +163,8 @@ LARGEST_ERROR = {UNIVERSAL: 1e-9, ISLAND4D: 1e-3}
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_shipped_tables_are_small_and_state_what_was_measured(kind):
-    table, verdict = read_table(shipped(kind), kind), verify(shipped(kind), kind)
+    table = read_table(shipped(kind), kind)
+    verdict = verify(shipped(kind), kind)
     attributes = table.attributes
     variant = get_variant(attributes["variant"]).recorded if kind == ISLAND4D else []
     configuration = json.loads(attributes["configuration"])

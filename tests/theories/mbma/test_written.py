@@ -31,7 +31,8 @@ def test_what_is_written_is_read(written):
     assert found.auxiliary.keys() == content.auxiliary.keys()
     assert found.conformance.keys() == content.conformance.keys()
     assert found.attributes.items() >= content.attributes.items()
-    arrays, expected = found.arrays(), content.arrays()
+    arrays = found.arrays()
+    expected = content.arrays()
     assert arrays.keys() == expected.keys()
     for name, values in expected.items():
         np.testing.assert_array_equal(arrays[name], values, err_msg=name)

@@ -75,10 +75,8 @@ class TestQuickGrid:
         pytest.importorskip("tamaas")
         values = heights(Part(*request.param))
         surface = Surface.from_map(values, 1.0, periodic=True, unit="um")
-        engine, pressure = (
-            Contact(values, (128.0, 128.0)),
-            law_loads(surface, (0.07, 0.14, 0.35, 0.55)),
-        )
+        engine = Contact(values, (128.0, 128.0))
+        pressure = law_loads(surface, (0.07, 0.14, 0.35, 0.55))
         rows = [engine.press(float(each)) for each in pressure]
         return (
             surface,
@@ -242,7 +240,8 @@ def test_one_stiffness_over_a_range_of_forces_is_told():
         contact(surface, pressure=0.1, theory="calibrated")
 
 
-POINTS, STEP = 256, 50.0
+POINTS = 256
+STEP = 50.0
 LOADS = (0.0105, 0.02, 0.06, 0.15, 0.35)  # from 2% to 60% contact
 
 

@@ -71,7 +71,8 @@ def test_it_opens_without_the_map(surface, own):
 
 
 def test_laws_scenes_and_other_units(surface, own):
-    law, known = contact_law(own), contact_law(surface, theory=FULL)
+    law = contact_law(own)
+    known = contact_law(surface, theory=FULL)
     np.testing.assert_array_equal(law.block, known.block)
     found = Scene(own, pressures=[0.01, 0.02], effects=["pressure", "area"]).run()
     np.testing.assert_allclose(found.area, contact(own, pressure=[0.01, 0.02]).area)
@@ -94,7 +95,8 @@ def test_laws_scenes_and_other_units(surface, own):
 
 
 def test_damaged_edited_and_other_files_are_refused(file, tmp_path):
-    content, bad = file.read_bytes(), tmp_path / "bad.nc"
+    content = file.read_bytes()
+    bad = tmp_path / "bad.nc"
     for broken in (
         content[:-10],
         content[:2000],
@@ -232,7 +234,8 @@ class TestBeyondTheLoads:
             )
         # -du/dF and the work of pressing on, by differences
         step = np.log(0.3) + np.array([-1e-5, 1e-5])
-        u, energy = curve.separation(step), curve.energy(step)
+        u = curve.separation(step)
+        energy = curve.energy(step)
         assert curve.stiffness(np.log(0.3)) == pytest.approx(
             np.diff(np.exp(step))[0] / -np.diff(u)[0], rel=1e-6
         )
@@ -265,7 +268,8 @@ class TestCache:
         )
 
     def test_it_goes_on_where_it_was_interrupted(self, place, monkeypatch):
-        real, calls = pressing.Contact, []
+        real = pressing.Contact
+        calls = []
 
         class Interrupted(real):
             def press(self, force):

@@ -107,7 +107,9 @@ class TestOfASurface:
     @staticmethod
     def exact(part):
         values, surface, _ = part
-        engine, rows, flows = Contact(values, (128.0, 128.0)), [], []
+        engine = Contact(values, (128.0, 128.0))
+        rows = []
+        flows = []
         for force in law_loads(surface, (0.067, 0.15, 0.39, 0.8)):
             found = engine.press(float(force))
             flows.append(flow_conductance(engine.gap, (128.0, 128.0)))
@@ -155,7 +157,8 @@ class TestOfASurface:
         assert law.at_pressure("5 MPa").area == pytest.approx(point.area, rel=0.01)
         assert law.theory == "simulated"
         for axis in ("x", "y"):
-            own, direct = law.leakage.along(axis), getattr(point.leakage, axis)
+            own = law.leakage.along(axis)
+            direct = getattr(point.leakage, axis)
             assert own(pressure="5 MPa") == pytest.approx(direct, rel=0.02)
             u = np.linspace(0.02, 1, 300) * law.h_max
             true = getattr(contact(surface, mean_separation=u, theory=FULL).leakage, axis)
@@ -291,10 +294,12 @@ def test_a_curve_that_is_level_at_its_end_goes_on():
 
 @pytest.mark.parametrize("eta", [0.1, 0.4])
 def test_a_hardness_is_simulated(eta):
-    values, cap = makers.heights(Part("honed", 1, 128)), eta * makers.GRADIENT
+    values = makers.heights(Part("honed", 1, 128))
+    cap = eta * makers.GRADIENT
     surface = Surface.from_map(values, 1.0, periodic=True)
     pressure = cap * np.array([0.03, 0.2, 0.5])
-    engine, rows = OwnContact(values, (128.0, 128.0), hardness=cap), []
+    engine = OwnContact(values, (128.0, 128.0), hardness=cap)
+    rows = []
     for force in pressure.tolist():
         row = engine.press(force)
         rows.append(

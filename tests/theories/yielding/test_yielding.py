@@ -86,10 +86,8 @@ def test_without_yielding_answers_are_elastic_to_the_last_bit(theory):
 
 @each
 def test_pressure_is_inverted_and_slopes_are_those_of_the_curve(theory):
-    pressure, known = (
-        np.array([1e-3, 1.0, 30.0, 300.0]),
-        {"E_star": MODULUS, "theory": theory, "hardness": HARDNESS},
-    )
+    pressure = np.array([1e-3, 1.0, 30.0, 300.0])
+    known = {"E_star": MODULUS, "theory": theory, "hardness": HARDNESS}
     found = contact_of(SURFACE, pressure=pressure, **known)
     assert found.pressure == pytest.approx(pressure, rel=1e-10)
     assert (found.area >= pressure / HARDNESS * (1 - 1e-10)).all()
@@ -126,7 +124,8 @@ def test_a_law_with_a_hardness_is_a_law(theory, rtol, surface, shares):
         "E_star": MODULUS,
         "hardness": HARDNESS if theory != "mbma" else 0.5 * MODULUS,
     }
-    law, u = law_of_names(surface, rtol=rtol, **asked), shares * surface.h_max
+    law = law_of_names(surface, rtol=rtol, **asked)
+    u = shares * surface.h_max
     found = contact_of(surface, mean_separation=u, **asked)
     for name in ("pressure", "area"):
         np.testing.assert_allclose(
@@ -186,7 +185,8 @@ def test_ten_thousand_contacts_keep_bounds_and_order():
         assert (other.pressure >= answer.pressure * (1 - 1e-13)).all()
     # at one force: more area under more load, less of it if harder
     elastic = theory.area_at(surface, answer.pressure)
-    force, cap = answer.pressure / surface.rms_gradient, eta / surface.rms_gradient
+    force = answer.pressure / surface.rms_gradient
+    cap = eta / surface.rms_gradient
     more = theory.area_at(surface, 1.01 * answer.pressure)
     assert (
         hardness.area(np.minimum(1.01 * force, cap), more, cap)
@@ -277,7 +277,8 @@ test_what_cannot_be_asked = refusals(
 
 
 def test_scatter_of_any_theory():
-    area, soft = np.array([0.02, 0.2]), 0.05 * float(SURFACE.rms_gradient)
+    area = np.array([0.02, 0.2])
+    soft = 0.05 * float(SURFACE.rms_gradient)
     for theory in map(get_theory, ("mbma", "persson", "greenwood_williamson")):
         each = (
             theory,
@@ -370,7 +371,8 @@ def test_hardnesses_of_any_size(theory, cap):
     ("theory", "most"), [("calibrated", 4), ("mbma", 5), ("greenwood_williamson", 5)]
 )
 def test_a_pressure_takes_few_elastic_answers(monkeypatch, theory, most):
-    kind, asked = type(get_theory(theory)), []
+    kind = type(get_theory(theory))
+    asked = []
     original = kind.answer
     monkeypatch.setattr(
         kind, "answer", lambda self, *given: asked.append(given) or original(self, *given)
@@ -385,7 +387,8 @@ def test_a_pressure_takes_few_elastic_answers(monkeypatch, theory, most):
 
 @each
 def test_pressures_short_of_the_hardness_are_held_or_refused(theory):
-    concrete, known = Surface.named("concrete"), {"theory": theory, "hardness": 0.02}
+    concrete = Surface.named("concrete")
+    known = {"theory": theory, "hardness": 0.02}
     deepest = contact_of(
         concrete, mean_separation=1e-9 * concrete.h_rms, **known
     ).pressure
@@ -414,7 +417,8 @@ def test_the_lightest_pressures_are_held():
 def between_walls(x, tau):
     """Areas by images alone, in 60 digits."""
     with mpmath.workdps(60):
-        x, width = mpmath.mpf(float(x)), 2 * mpmath.sqrt(mpmath.mpf(float(tau)))
+        x = mpmath.mpf(float(x))
+        width = 2 * mpmath.sqrt(mpmath.mpf(float(tau)))
         reach = range(int(12 * width) + 3)
         touching = mpmath.erf(x / width) + mpmath.fsum(
             mpmath.erfc((2 * k - x) / width) - mpmath.erfc((2 * k + x) / width)
@@ -502,7 +506,8 @@ def test_capped_boundary_elements(recipe):
         Contact(surface, recipe.sizes, hardness=cap) for cap in (np.inf, 0.2)
     )
     for force in (0.01, 0.1):
-        free, held = elastic.press(force), capped.press(force)
+        free = elastic.press(force)
+        held = capped.press(force)
         other = Elastic(surface, recipe.sizes).press(force)
         for name in ("area", "mean_separation", "energy"):
             assert free[name] == pytest.approx(other[name], rel=2e-4), name
@@ -526,7 +531,8 @@ def test_held_out_surfaces_are_within_the_stated_bars():
         attributes[f"law_{name}"] == value
         for name, value in vars(hardness.CONSTANTS).items()
     )
-    sets, quantities = attributes["sets"].split(), attributes["quantities"].split()
+    sets = attributes["sets"].split()
+    quantities = attributes["quantities"].split()
     numbers = dict(zip(sets, variables["accuracy"], strict=True))
     held = np.stack([numbers[name] for name in ("held_out_surface", "held_out_spectrum")])
     share = (held[..., 2] * held[..., 4]).sum(axis=0) / held[..., 4].sum(axis=0)
