@@ -337,9 +337,9 @@ def few_numbers(rng: np.random.Generator) -> None:
 FIRST = {
     "import mbma_tables": "m",
     "an answer": "m.contact(m.Surface(0.8, 1.0, 200.0, 1.0, 3.0), separation=1.0)",
-    "100,000 gaps of a law": "m.contact_law(S(), 'mbma').pressure(np.linspace(0.05, 2.95, 100_000))",
+    "100,000 gaps of a law": "m.contact_law(S(), theory='mbma').pressure(np.linspace(0.05, 2.95, 100_000))",
     "10,000 surfaces": "m.contact(S(10_000), separation=1.0)",
-    "an exact total": "m.contact(S(), separation=1.0, island_model='exact')",
+    "an exact total": "m.contact(S(), separation=1.0, theory=m.theories.Mbma('exact'))",
 }
 
 

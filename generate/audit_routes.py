@@ -140,7 +140,7 @@ def by_joint_command(question: Question) -> list[FloatArray]:
         f"{name} = {json.dumps(value)}\n" for name, value in question.face.items()
     )
     text = (
-        f"materials = {json.dumps(question.materials)}\n"
+        f"bodies = {json.dumps(question.materials)}\n"
         f"nominal_area = {json.dumps(question.nominal_area)}\n"
         f'theory = "{question.theory}"\ngas = "vacuum"\n[part_a]\n{face}'
     )

@@ -143,7 +143,7 @@ n = 1000
 many = Surface(np.linspace(0.3, 1.0, n), 0.2, np.geomspace(0.7, 4000, n), 1.0, 3.0)
 
 def answers():
-    law = contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0), "mbma")
+    law = contact_law(Surface(0.7, 0.2, 60.0, 1.0, 3.0), theory="mbma")
     total = contact(many, separation=1.0).pressure
     found = total, law.pressure(0.5), law.at_pressure(1e-3).area
     return b"".join(np.asarray(one).tobytes() for one in found)
@@ -167,8 +167,8 @@ def test_forks_after_use_go_on():
 LONG = {
     "totals": ("", "contact(many, separation=1.0, theory='mbma')"),
     "exact": (
-        "",
-        "contact(one, separation=np.linspace(0, 2, 2000), island_model='exact')",
+        "from mbma_tables.theories import Mbma\nexact = Mbma(island_model='exact')",
+        "contact(one, separation=np.linspace(0, 2, 2000), theory=exact)",
     ),
     "islands": ("X = np.linspace(-5, 40, 1_000_000)", "greenwood_tripp.solve(X, 1.0)"),
     "four numbers": (
@@ -181,8 +181,9 @@ LONG = {
     ),
     "calibrated": ("", "contact(one, mean_separation=u, theory='calibrated')"),
     "hardness": (
-        "pressure = np.geomspace(1e-4, 1e-2, 1_000_000)",
-        "contact(one, pressure=pressure, theory='calibrated', hardness=0.05)",
+        "from mbma_tables import Bodies\n"
+        "pressure, bodies = np.geomspace(1e-4, 1e-2, 1_000_000), Bodies(hardness=0.05)",
+        "contact(one, bodies, pressure=pressure, theory='calibrated')",
     ),
     "leakage": (
         "found = contact(one, mean_separation=u, theory='calibrated')",
