@@ -1,4 +1,4 @@
-"""The boundary-element simulation of a map, as a surface carries it: loads and flow, without the heights."""
+"""The boundary-element simulation of a map, as a surface carries it: loads and flow."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 
-MIN_POINTS = (
-    4.0  # sampling steps a wave, below which areas of boundary elements are too large
-)
+# sampling steps a wave, below which areas of boundary elements are too large
+MIN_POINTS = 4.0
 ROUNDING = 1e-6  # relative, of wavelengths and sampling steps
 
 
 def resolving(shortest: float, step: float, unit: str | None) -> str:
-    """The option of `Surface.from_map` that leaves wavelengths of enough sampling steps; empty if they are."""
+    """The option of `Surface.from_map` that leaves wavelengths of enough sampling steps.
+
+    Empty if they are that long already.
+    """
     if shortest >= MIN_POINTS * step * (1 - ROUNDING):
         return ""
     # a little longer, so that four digits are enough
@@ -32,9 +34,8 @@ class MapSimulation:
     flow_gaps: FloatArray  # mean gaps, falling, shape (m,),
     flow: FloatArray  # and flow coefficients xx, yy, xy there [length^3], shape (m, 3)
     points: float  # sampling steps along the shortest wavelength
-    left_out: (
-        float  # wavelength [length] below which a large map was cut off; 0 if it was not
-    )
+    # wavelength [length] below which a large map was cut off; 0 if it was not
+    left_out: float
     origin: str  # description of the map and of the simulation
 
     def flows(
@@ -44,11 +45,12 @@ class MapSimulation:
         return self.flow_gaps, self.flow
 
     def resized(self, up: float, along: float) -> MapSimulation:
-        """For the surface with heights multiplied by `up` and lengths along the plane by `along`."""
+        """For the surface with heights times `up` and lengths along the plane times `along`."""
         by = np.array([[up / along], [1.0], [up], [up**2 / along]])
-        gaps = self.flow_gaps * up
-        flow = self.flow * up**3
-        left_out = self.left_out * along
         return dataclasses.replace(
-            self, rows=self.rows * by, flow_gaps=gaps, flow=flow, left_out=left_out
+            self,
+            rows=self.rows * by,
+            flow_gaps=self.flow_gaps * up,
+            flow=self.flow * up**3,
+            left_out=self.left_out * along,
         )
