@@ -7,7 +7,10 @@ from mbma_tables.export.core_code import core_places
 from mbma_tables.export.language import Language
 from mbma_tables.export.text import number
 
-LAST_VALUE = "At pressures beyond the law's range the last value is used, with one warning on stderr."
+LAST_VALUE = (
+    "At pressures beyond the law's range the last value is used, with one warning on "
+    "stderr."
+)
 # of a solver's surface interactions, by the names of its routine
 _INTERACTIONS = (
     "Surface interactions of other names stop the job. Several laws in one job, each exported "
