@@ -285,7 +285,7 @@ class Theory(abc.ABC):
             if not left.size:
                 break
             theory = self.at(shape, left)
-            part = select(surface, shape, left)
+            part = select(surface, shape, left) if surface.shape else surface
             is_whole = theory is self and part is surface
             curve_of_left = curve if is_whole else theory.curve(part, quantity)
             value, slope, _ = curve_of_left(search.gap[left])
@@ -492,7 +492,9 @@ class Search:
         ratio = np.exp(y0 + step)
         gap = ratio / (1 + ratio / end)
         is_inside = (gap > self.low) & (gap < self.high)
-        self.gap = np.where(is_inside, gap, _middle(self.low, self.high))
+        if not is_inside.all():
+            gap = np.where(is_inside, gap, _middle(self.low, self.high))
+        self.gap = gap
 
     def step(
         self, left: NDArray[np.intp], value: FloatArray, slope: FloatArray
@@ -517,7 +519,9 @@ class Search:
             # without exact slopes it is about the product of the last two
             is_settled &= np.abs(miss * apart) <= 1e-14
         is_inside = (following > low) & (following < high)
-        bracketed = np.where(is_inside, following, _middle(low, high))
+        bracketed = following
+        if not is_inside.all():
+            bracketed = np.where(is_inside, following, _middle(low, high))
         clipped = np.minimum(np.maximum(following, low), high)
         gap = np.where(is_settled, clipped, bracketed)
         gap[np.isnan(miss) | ~(u > 0)] = np.nan
