@@ -70,7 +70,8 @@ BRINELL_DIAMETERS = (0.24, 0.6)  # of indentations over that of the ball, ISO 65
 # number, scale, and of Brinell numbers the ball's diameter [mm] and force [kgf]; other
 # loads do not matter
 _SCALE = re.compile(
-    r"\s*([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?)\s*(HV|HRC|HRB|HBW?)\s*(?:([0-9]+\.?[0-9]*)/([0-9]+\.?[0-9]*))?[0-9./]*\s*"
+    r"\s*([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?)\s*(HV|HRC|HRB|HBW?)\s*"
+    r"(?:([0-9]+\.?[0-9]*)/([0-9]+\.?[0-9]*))?[0-9./]*\s*"
 )
 # ranges of metals' constants: numbers outside are in another unit
 MODULI = (0.01, 2000.0)
@@ -181,7 +182,8 @@ class Metal:
         modulus = one_number("E" + whose, Units(stress="GPa").number("E", self.E))
         require(
             f"E{whose} [GPa]", np.asarray(modulus), (modulus >= MODULI[0]) & (modulus <= MODULI[1]),
-            f"from {MODULI[0]:g} to {MODULI[1]:g} GPa, as a number in GPa or as a text such as '210 GPa'",
+            f"from {MODULI[0]:g} to {MODULI[1]:g} GPa, as a number in GPa or as a text "
+            "such as '210 GPa'",
         )  # fmt: skip
         ratio = one_number("nu" + whose, self.nu)
         _poisson("nu" + whose, ratio)
@@ -202,10 +204,13 @@ class Metal:
                 raise InputError(
                     f"{name}{whose}: the lowest comes first, got {ends[0]:g} and {ends[1]:g}"
                 )
-        own = {
-            "E": float(modulus), "nu": float(ratio), "hardness": tuple(tempers), "conductivity": tuple(conductivities)
-        }  # fmt: skip
-        for name, value in own.items():
+        constants = {
+            "E": float(modulus),
+            "nu": float(ratio),
+            "hardness": tuple(tempers),
+            "conductivity": tuple(conductivities),
+        }
+        for name, value in constants.items():
             object.__setattr__(self, name, value)
 
 
@@ -231,7 +236,7 @@ def _conductivity(name: str, value: Any) -> Any:
 
 
 def _vickers_pressure(number: float) -> float:
-    """Force over projected area [GPa] of a Vickers number, whose pyramid has 136 degrees between faces."""
+    """Force over projected area [GPa] of a Vickers number (136 degrees between faces)."""
     return 9.80665e-3 * number / math.sin(math.radians(68))
 
 
@@ -244,7 +249,7 @@ def _brinell_pressure(number: float, load: float) -> float:
 
 
 def _metals() -> tuple[dict[str, Metal], dict[tuple[str, ...], str]]:
-    """The metals of tables/metals.csv by name, and their names by the words of these and of their other names."""
+    """The metals of tables/metals.csv by name, and all their names by the words of these."""
     metals: dict[str, Metal] = {}
     names: dict[tuple[str, ...], str] = {}
     lines = shipped_file("metals.csv").read_text(encoding="utf-8").splitlines()
@@ -281,7 +286,7 @@ HARDEST = max(metal.hardness[1] for metal in _METALS.values())
 
 
 def get(name: str) -> Metal:
-    """Ranges of a metal's constants; `METALS` lists the names, after which "soft" or "hard" may name a temper.
+    """Ranges of a metal's constants; `METALS` lists names, "soft" or "hard" may follow.
 
     Names in other standards, such as "S355J2", "1.4301", "6061-T6" or "GG25", are known too
     (`also` in tables/metals.csv). Capitals, hyphens and the order of words do not count.
@@ -314,7 +319,8 @@ def get(name: str) -> Metal:
                 known = f"{plain} {temper}" if plain in _METALS else known
     if known is None:
         raise InputError(
-            f"no metal is named {name!r}: give {_alike(str(name))}, perhaps with ' soft' or ' hard', or a Metal"
+            f"no metal is named {name!r}: give {_alike(str(name))}, perhaps with ' soft' "
+            "or ' hard', or a Metal"
         )
     plain, _, temper = known.rpartition(" ")
     if plain in _METALS and temper in TEMPERS:
@@ -355,7 +361,10 @@ class Pair:
 
     @property
     def hardness(self) -> str | None:
-        """Hardness of the softer one with its unit; None if its tempers differ by more than a factor of 1.3."""
+        """Hardness of the softer one with its unit.
+
+        None if its tempers differ by more than a factor of 1.3.
+        """
         soft, hard = self.softer.hardness
         return f"{math.sqrt(soft * hard):.6g} GPa" if hard <= ONE_TEMPER * soft else None
 
@@ -376,7 +385,7 @@ def pair(
     | Pair
     | Sequence[str | Metal | Mapping[str, Any]],
 ) -> Pair:
-    """Two metals in contact: names, `Metal` objects or their constants by name, or one metal for both bodies.
+    """Two metals in contact: names, `Metal` objects or mappings, or one for both bodies.
 
     Examples
     --------
@@ -438,10 +447,12 @@ def hardness(given: str) -> str:
     Examples
     --------
     >>> from mbma_tables import materials
-    >>> materials.hardness("200 HV"), materials.hardness("58 HRC"), materials.hardness("aluminium 6061 hard")
-    ('2.11536 GPa', '6.9405 GPa', '0.95 GPa')
-    >>> materials.hardness("200 HB"), materials.hardness("95 HBW 10/500"), materials.hardness("90 HRB")
-    ('2.05967 GPa', '0.947505 GPa', '2.03604 GPa')
+    >>> materials.hardness("200 HV"), materials.hardness("58 HRC")
+    ('2.11536 GPa', '6.9405 GPa')
+    >>> materials.hardness("200 HB"), materials.hardness("95 HBW 10/500")
+    ('2.05967 GPa', '0.947505 GPa')
+    >>> materials.hardness("90 HRB"), materials.hardness("aluminium 6061 hard")
+    ('2.03604 GPa', '0.95 GPa')
     """
     text = str(given)
     if match := _SCALE.fullmatch(text):
@@ -453,13 +464,17 @@ def hardness(given: str) -> str:
         try:
             known = pair(text).hardness
         except InputError as fault:
-            kinds = "a number, a text such as '1.5 GPa', '200 HV', '200 HB', '58 HRC' or '90 HRB', or a metal"
+            kinds = (
+                "a number, a text such as '1.5 GPa', '200 HV', '200 HB', '58 HRC' or "
+                "'90 HRB', or a metal"
+            )
             raise InputError(f"hardness must be {kinds}: {fault}") from None
         if known is None:
             soft, hard = get(text).hardness
             raise InputError(
-                f"the hardness of {text!r} depends on its temper: write '{text} soft' ({soft:g} GPa), '{text} hard' "
-                f"({hard:g} GPa), or a hardness such as '{soft:g} GPa', '200 HV' or '40 HRC'"
+                f"the hardness of {text!r} depends on its temper: write '{text} soft' "
+                f"({soft:g} GPa), '{text} hard' ({hard:g} GPa), or a hardness such as "
+                f"'{soft:g} GPa', '200 HV' or '40 HRC'"
             )
         return known
     return text
@@ -468,7 +483,7 @@ def hardness(given: str) -> str:
 def _pressure_of_number(
     number: float, scale: str, ball: str | None, force: str | None
 ) -> float:
-    """Mean pressure [GPa] of a hardness number, of a Brinell number with diameter [mm] and force [kgf] if given."""
+    """Mean pressure [GPa] of a hardness number; Brinell with diameter [mm], force [kgf]."""
     value = finite_array("hardness", number)
     if scale.startswith("HB"):
         load = BRINELL_LOAD
@@ -482,8 +497,9 @@ def _pressure_of_number(
         most = math.floor(load / (math.pi * shallow))
         require(
             f"hardness [{scale}]", value, (value >= least) & (value <= most),
-            f"from {least} to {most} at {load:g} kgf per square millimetre of the ball's diameter (ISO 6506-1); with "
-            "the ball's diameter in mm and another load in kgf it is written '95 HBW 10/500'",
+            f"from {least} to {most} at {load:g} kgf per square millimetre of the ball's "
+            "diameter (ISO 6506-1); with the ball's diameter in mm and another load in "
+            "kgf it is written '95 HBW 10/500'",
         )  # fmt: skip
         return _brinell_pressure(number, load)
     if scale in ROCKWELL:
@@ -514,7 +530,9 @@ def microhardness(surface: Any, c1: float | str, c2: float) -> str:
     Examples
     --------
     >>> from mbma_tables import Surface, materials
-    >>> face = Surface.from_roughness(Rq="1 um", longest="250 um", shortest="4 um", hurst=0.8, nominal_area="4 cm^2")
+    >>> face = Surface.from_roughness(
+    ...     Rq="1 um", longest="250 um", shortest="4 um", hurst=0.8, nominal_area="4 cm^2"
+    ... )
     >>> materials.microhardness(face, "5 GPa", -0.2)
     '2.57205 GPa'
     """
@@ -533,14 +551,14 @@ def microhardness(surface: Any, c1: float | str, c2: float) -> str:
 
 
 def hardness_in(units: Units, value: Any) -> Any:
-    """A hardness in the given units, from any text that `hardness` accepts; numbers are unchanged."""
+    """A hardness in these units, from any text of `hardness`; numbers are unchanged."""
     if isinstance(value, list | tuple):
         return [hardness_in(units, each) for each in value]
     return units.number("hardness", hardness(value) if isinstance(value, str) else value)
 
 
 def bodies(materials: Any, E_star: Any, hardness: Any) -> tuple[Any, Any, Pair | None]:
-    """Modulus and hardness of a contact, as given or from the named materials, and these materials."""
+    """Modulus and hardness of a contact, by arguments or materials, and these materials."""
     if materials is None:
         return E_star, hardness, None
     known = pair(materials)
@@ -574,8 +592,10 @@ def tangential_ratio(
     Examples
     --------
     >>> from mbma_tables.materials import tangential_ratio
-    >>> round(float(tangential_ratio(0.3)), 4), round(float(tangential_ratio((0.3, 0.3), (210.0, 70.0))), 4)
-    (1.2143, 1.2143)
+    >>> round(float(tangential_ratio(0.3)), 4)
+    1.2143
+    >>> round(float(tangential_ratio((0.3, 0.3), (210.0, 70.0))), 4)
+    1.2143
     """
     ratio = _poisson("nu", nu)
     if (E is None) == (ratio.shape == (2,)) or (E is not None and len(E) != 2):

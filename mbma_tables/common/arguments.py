@@ -94,7 +94,7 @@ MOVED = {
 
 
 def hinted(function: Callable[P, R]) -> Callable[P, R]:
-    """Decorator: the error for an unknown argument names the nearest known one, or the meaning of a symbol."""
+    """Decorator: an unknown argument's error names the nearest, or a symbol's meaning."""
     parameters = inspect.signature(function).parameters
     names = [name for name in parameters if name not in ("self", "cls")]
     called = function.__qualname__.removesuffix(".__init__")
@@ -145,7 +145,7 @@ def any_labelled(surface: Any, *values: Any) -> bool:
 
 
 def finite_array(name: str, value: ArrayLike) -> FloatArray:
-    """`value` as a float64 array; empty, masked, complex, non-numeric, NaN or infinite input is refused.
+    """`value` as a float64 array; empty, masked, complex, text, NaN and infinite are errors.
 
     A masked array without masked entries is accepted.
     """
@@ -155,19 +155,20 @@ def finite_array(name: str, value: ArrayLike) -> FloatArray:
     # xarray's other containers, and HDF5's: an array with names that would be lost here
     if hasattr(value, "dims") and not is_labelled(value):
         raise InputError(
-            f"{name} must be numbers, an array or a DataArray: pass the array inside that {type(value).__name__}"
+            f"{name} must be numbers, an array or a DataArray: pass the array inside "
+            f"that {type(value).__name__}"
         )
     # pint's and astropy's, whose units numpy would drop
     if hasattr(value, "magnitude") or hasattr(value, "to_value"):
         raise InputError(
-            f"{name} is a {type(value).__name__} with a unit of its own: convert it and pass its numbers, or a "
-            "text such as '10 MPa'"
+            f"{name} is a {type(value).__name__} with a unit of its own: convert it and "
+            "pass its numbers, or a text such as '10 MPa'"
         )
     if np.ma.is_masked(value):
         masked = np.ma.getmaskarray(np.ma.asanyarray(value))
         raise InputError(
-            f"{name} has {masked.sum()} masked entries among {masked.size}: leave them out with .compressed(), or put "
-            "numbers in their place with .filled(number)"
+            f"{name} has {masked.sum()} masked entries among {masked.size}: leave them "
+            "out with .compressed(), or put numbers in their place with .filled(number)"
         )
     try:
         given = np.asarray(value)
@@ -203,7 +204,7 @@ def rows(*given: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
 def filled(
     fill: Callable[..., Any], columns: Any, outputs: int, *more: Any
 ) -> FloatArray:
-    """Rows that a loop of the core, ``fill(*columns, *more, *rows)``, makes of flat columns of one length."""
+    """Rows that ``fill(*columns, *more, *rows)`` makes of flat columns of one length."""
     size = columns[0].size
     out = np.empty((outputs, size))
     if size <= BLOCK:
@@ -256,7 +257,7 @@ def grouped(owner: NDArray[np.intp]) -> list[tuple[int, NDArray[np.intp]]]:
 def require(
     name: str, value: FloatArray, good: Any, allowed: str, unit: str = ""
 ) -> None:
-    """Raise an error for entries of `value` where `good` is false; `allowed` describes valid ones, `unit` is theirs."""
+    """Raise an error where `good` is false; `allowed` describes valid entries, in `unit`."""
     if isinstance(good, np.bool_) and good:
         return
     bad = ~np.asarray(good, dtype=bool)

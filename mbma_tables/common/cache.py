@@ -1,4 +1,6 @@
-"""A folder of results that take long to compute, kept between processes: whole files, the oldest removed first.
+"""A folder of results that take long to compute, kept between processes.
+
+Files are written whole; the oldest are removed first.
 
 The folder is that of the platform's caches; the environment variable `MBMA_TABLES_CACHE`
 names another, and "off" turns it off. Results that cannot be read or written are computed
@@ -51,7 +53,7 @@ def folder() -> pathlib.Path | None:
 
 
 def load(name: str, **shapes: tuple[int, ...]) -> dict[str, FloatArray] | None:
-    """The arrays stored under a name, of these shapes; None if there are none, or the file is damaged."""
+    """The arrays stored under a name, of these shapes; None if absent or damaged."""
     place = folder()
     if place is None:
         return None
@@ -104,7 +106,7 @@ def files() -> list[tuple[pathlib.Path, os.stat_result]]:
 
 
 def trim(most: int = MAX_BYTES) -> int:
-    """Remove files, least recently used first, until the rest has at most so many bytes; returns how many."""
+    """Remove the oldest files until the rest has at most so many bytes; how many went."""
     kept = files()
     removed = 0
     size = sum(stat.st_size for _, stat in kept)

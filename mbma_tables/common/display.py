@@ -1,4 +1,4 @@
-"""Display of results: a line in a terminal, a small table with its picture in a notebook, an xarray Dataset.
+"""Display of results: a line, a table with its picture, an xarray Dataset.
 
 A class that derives from `Displayed` defines its description (`_facts`), its quantities
 (`_variables`) and its picture (`_figure`).
@@ -40,7 +40,7 @@ class Variable(NamedTuple):
 
 
 def shown(value: Any, unit: str = "1") -> str:
-    """A number, or the range of an array, with its unit; of a DataArray, which may be lazy, its sizes."""
+    """A number, or the range of an array, with its unit; sizes of a lazy DataArray."""
     if is_labelled(value):
         return f"<DataArray {dict(value.sizes)}>"
     numbers = np.asarray(value)
@@ -58,12 +58,15 @@ def shown(value: Any, unit: str = "1") -> str:
 
 
 def quantity(meaning: str) -> Any:
-    """A field of a `Displayed` dataclass; its meaning goes to the docstring and, up to a semicolon, to the Dataset."""
+    """A field of a `Displayed` dataclass.
+
+    Its meaning goes to the docstring and, up to a semicolon, to the Dataset.
+    """
     return dataclasses.field(metadata={"meaning": meaning})
 
 
 class Displayed:
-    """Base class with display as a line, as a table with a picture, as a figure and as a Dataset."""
+    """Base class with display as a line, a table with a picture, a figure and a Dataset."""
 
     units: Any
     _dims: ClassVar[tuple[str, ...] | None] = None
@@ -119,8 +122,8 @@ class Displayed:
 
     def _repr_html_(self) -> str:
         rows = "".join(
-            f"<tr><th style='text-align:left'>{html.escape(name)}</th><td style='text-align:left'>{html.escape(text)}"
-            "</td></tr>"
+            f"<tr><th style='text-align:left'>{html.escape(name)}</th><td "
+            f"style='text-align:left'>{html.escape(text)}</td></tr>"
             for name, text in self._facts().items()
         )
         table = f"<div><b>{type(self).__name__}</b><table>{rows}</table>"
@@ -132,7 +135,7 @@ class Displayed:
         return f"{table}<img src='data:image/png;base64,{picture}'></div>"
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
-        """Plot the quantities and return the figure; with `path` ("name.svg", .pdf, .png) it is also saved.
+        """Plot the quantities and return the figure; `path` ("name.svg", .pdf, .png) saves it.
 
         Raises
         ------
@@ -154,7 +157,8 @@ def saved(figure: Figure, path: str | os.PathLike[str] | None) -> Figure:
         kind = os.fspath(path).rpartition(".")[2]
         if kind not in KINDS:
             raise InputError(
-                f"a picture's name must end with one of .{', .'.join(KINDS)}, got {os.fspath(path)!r}"
+                f"a picture's name must end with one of .{', .'.join(KINDS)}, got "
+                f"{os.fspath(path)!r}"
             )
         write_file(path, to_picture(figure, kind))
     return figure

@@ -1,4 +1,4 @@
-"""Files: where the shipped data are, reading with a size limit, and writing a file whole or not at all."""
+"""Files: shipped data, reading with a size limit, writing whole or not at all."""
 
 import contextlib
 import glob
@@ -28,7 +28,10 @@ def shipped_file(name: str) -> pathlib.Path:
 
 
 def numbers_of(lines: list[str], delimiter: str | None) -> FloatArray:
-    """The numbers of text, shape (rows, columns); the error names row and column, and quotes nothing of the file."""
+    """The numbers of text, shape (rows, columns); the error names row and column.
+
+    It quotes nothing of the file.
+    """
     import warnings
 
     import numpy as np
@@ -46,7 +49,10 @@ def numbers_of(lines: list[str], delimiter: str | None) -> FloatArray:
 
 
 def read_file(path: os.PathLike[str] | str, max_bytes: int) -> bytes:
-    """The content of a regular file of at most `max_bytes`; links are followed, "-" is standard input."""
+    """The content of a regular file of at most `max_bytes`; "-" is standard input.
+
+    Links are followed.
+    """
     try:
         # a pipe would wait for a writer, a device may have no end
         if os.fspath(path) != "-" and not stat.S_ISREG(os.stat(path).st_mode):
@@ -109,7 +115,7 @@ def write_file(
 
 
 def written_bytes(name: str, write: Callable[[str], object]) -> bytes:
-    """The bytes that a library writes where it takes only a path, by way of the system's temporary folder."""
+    """The bytes that a library writes to a path, by way of the temporary folder."""
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, name)
         try:

@@ -9,14 +9,14 @@ WAIT = 0.1  # s between two checks for Ctrl-C
 
 
 def in_blocks(fill: Callable[[slice], Answer], count: int, size: int) -> list[Answer]:
-    """``fill(slice)`` of each `size` of `count` entries, in order; Ctrl-C takes effect between two of them."""
+    """``fill(slice)`` of each `size` of `count` entries, in order; Ctrl-C ends it."""
     return [
         fill(slice(first, min(first + size, count))) for first in range(0, count, size)
     ]
 
 
 def interruptible(compute: Callable[[], Answer]) -> Answer:
-    """``compute()``, a single call of another library that lets other threads run; Ctrl-C ends the wait for it.
+    """``compute()``, a single call of another library, in a thread; Ctrl-C ends the wait.
 
     What it computes then goes on in a thread of its own to its end, or to that of the process.
     """

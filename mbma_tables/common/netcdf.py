@@ -1,4 +1,4 @@
-"""Open and check table files (netCDF-4), which `generate.tables.writing` writes; write those of a user's own surface.
+"""Open and check table files (netCDF-4); write those of a user's own surface.
 
 A file ends in a line with the SHA-256 of all bytes before it, which is checked before the
 HDF5 library opens the file, since that may crash on damaged bytes. HDF5 ignores what
@@ -61,7 +61,7 @@ def digest_arrays(arrays: dict[str, Any]) -> str:
 
 
 def _attributes_of(owner: Any) -> dict[str, Any]:
-    """The attributes of a file or a variable as plain Python values, lists where they are arrays."""
+    """The attributes of a file or variable as Python values, lists where they are arrays."""
     values = {name: owner.getncattr(name) for name in owner.ncattrs()}
     return {
         name: v.tolist() if isinstance(v, np.ndarray | np.generic) else v
@@ -70,7 +70,10 @@ def _attributes_of(owner: Any) -> dict[str, Any]:
 
 
 def attributes_digest(dataset: netCDF4.Dataset) -> str:
-    """SHA-256 of all attributes of a file except this hash, and of the dimensions and attributes of its variables."""
+    """SHA-256 of a file's attributes except this hash, and of its variables' descriptions.
+
+    The latter are their dimensions and attributes.
+    """
     own = _attributes_of(dataset)
     content = {
         "": {name: value for name, value in own.items() if name != "attributes_sha256"}
@@ -105,7 +108,10 @@ def read_sealed(path: pathlib.Path, remedy: str = REMEDY.format("all")) -> bytes
 
 @contextlib.contextmanager
 def opened(path: os.PathLike[str] | str, remedy: str) -> Iterator[netCDF4.Dataset]:
-    """The dataset of a table file whose checksum is right; all errors are `TableFileError` and name the remedy."""
+    """The dataset of a table file, its checksum verified.
+
+    All errors are `TableFileError` and name the remedy.
+    """
     import netCDF4
 
     source = pathlib.Path(path)
@@ -125,7 +131,7 @@ def opened(path: os.PathLike[str] | str, remedy: str) -> Iterator[netCDF4.Datase
 def verified(
     dataset: netCDF4.Dataset, required: tuple[str, ...] = ("values_sha256",)
 ) -> tuple[dict[str, Any], dict[str, dict[str, Any]], dict[str, Any]]:
-    """Attributes of an open file, those of its variables, and their values, checked by hashes and types."""
+    """Attributes of an open file and of its variables, and their values, all checked."""
     # values as they are stored, for their hash
     dataset.set_auto_maskandscale(False)
     own = _attributes_of(dataset)
@@ -138,7 +144,8 @@ def verified(
     for name, variable in dataset.variables.items():
         if variable.dtype != np.dtype("<f8"):
             raise ValueError(
-                f"holds variable {name}, which must hold little-endian doubles, not {variable.dtype}"
+                f"holds variable {name}, which must hold little-endian doubles, not "
+                f"{variable.dtype}"
             )
     missing = [name for name in required if name not in own]
     if missing or own.get("attributes_sha256") != attributes_digest(dataset):
@@ -241,7 +248,10 @@ def write_own(
     variables: Mapping[str, tuple[tuple[str, ...], Any, str, str]],
     attributes: Mapping[str, str],
 ) -> None:
-    """Write variables (dimensions, values, long_name, units) and attributes whole, or not at all."""
+    """Write variables (dimensions, values, long_name, units) and attributes whole.
+
+    If that fails, nothing is written.
+    """
     import netCDF4
 
     arrays = {name: np.asarray(entry[1], float) for name, entry in variables.items()}
@@ -274,14 +284,15 @@ def write_own(
 
 
 def read_own(path: os.PathLike[str] | str) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Values and attributes of such a file, checked; TableFileError for damaged, edited and other ones."""
+    """Values and attributes of such a file; TableFileError where damaged or edited."""
     with opened(path, OWN_REMEDY) as dataset:
         own, _, values = verified(
             dataset, ("mbma_kind", "format_version", "values_sha256")
         )
         if (own["mbma_kind"], own["format_version"]) != (OWN, OWN_FORMAT):
             raise ValueError(
-                f"holds a {own['mbma_kind']} of format {own['format_version']}, not a {OWN} of {OWN_FORMAT}"
+                f"holds a {own['mbma_kind']} of format {own['format_version']}, not a "
+                f"{OWN} of {OWN_FORMAT}"
             )
         lost = [name for name, array in values.items() if not np.isfinite(array).all()]
         if lost:

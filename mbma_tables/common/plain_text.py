@@ -2,7 +2,9 @@
 
 
 def visible(text: str, keep: str = "") -> str:
-    r"""Text in which control characters, line ends and half surrogates are escapes, but for those to keep.
+    r"""Text with control characters, line ends and half surrogates as escapes.
+
+    Those in `keep` stay as they are.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Pictures of compression: pressure against gap, and real contact area against pressure, with the scatter of theories.
+"""Pictures of compression: pressure and contact area, with the scatter of theories.
 
 Figures are drawn without pyplot, so nothing of the caller's matplotlib state is read or changed.
 """
@@ -84,7 +84,7 @@ def draw_panels(
     panels: Mapping[str, Sequence[tuple[str, FloatArray, FloatArray | None]]],
     x_label: str,
 ) -> Figure:
-    """Panels by the label of their ordinate, of lines: name, values, and standard deviation of ln or None."""
+    """Panels by their ordinate's label; a line has a name, values, and scatter or None."""
     figure = new_figure(5 * (len(panels) + 1) // 2, 8)
     for axes, (label, lines) in zip(
         figure.subplots(2, -(-len(panels) // 2)).flat, panels.items(), strict=False
@@ -107,7 +107,7 @@ def draw_compression(
     leakage_label: str = LEAKAGE_LABEL,
     more: Mapping[str, Mapping[str, FloatArray]] = MappingProxyType({}),
 ) -> Figure:
-    """Two panels: pressure (logarithmic) against u/h_rms, and area against pressure (both logarithmic).
+    """Two panels: pressure against u/h_rms, and area against pressure (logarithmic).
 
     A third one, flow coefficient against pressure, where a curve has leakage, and one for
     each label of `more`, with lines by name over the first curve's pressure. Points without
@@ -172,7 +172,7 @@ def _band(axes: Axes, x: FloatArray, y: FloatArray, scatter: FloatArray | None) 
 def to_picture(
     figure: Figure, kind: str = "png", dpi: float = 120, outlines: bool = False
 ) -> bytes:
-    """The figure as the content of a file of a `kind` of `KINDS`, the same bytes for the same figure.
+    """The figure as the content of a file of a `kind` of `KINDS`, always the same bytes.
 
     Text stays text in SVG; with `outlines` its letters are drawn as paths, which need no
     font, and coordinates have two decimals, so that rounding differences between machines

@@ -58,7 +58,10 @@ def _beat(start: float) -> None:
     while not _ended.wait(wait):
         wait = 0.5
         _visible.set()
-        text = f"{WIPE}mbma: {visible(_doing[-1])}, {time.monotonic() - start:.0f} s (Ctrl-C ends it)"
+        text = (
+            f"{WIPE}mbma: {visible(_doing[-1])}, {time.monotonic() - start:.0f} s "
+            "(Ctrl-C ends it)"
+        )
         click.echo(text, err=True, nl=False)
 
 

@@ -1,4 +1,4 @@
-"""What is made once and shared by all callers: cached results, with arrays that nobody can change."""
+"""Cached results that all callers share, with arrays that nobody can change."""
 
 import functools
 from collections.abc import Callable
@@ -25,7 +25,7 @@ def parts_of(value: Any) -> list[Any]:
 
 
 def frozen(value: T) -> T:
-    """`value`, after making every array in it read-only, through containers and objects of this package."""
+    """`value` with every array in it read-only, also in containers and own objects."""
     seen = set[int]()
     pending: list[Any] = [value]
     while pending:

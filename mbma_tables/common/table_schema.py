@@ -1,4 +1,4 @@
-"""Contents of a table file: names of the format, types of the attributes, consistency of the parts (docs/tables.md).
+"""Contents of a table file: names, types of attributes, consistency (docs/tables.md).
 
 The core relies on these checks, and the text of attributes is written to exported files.
 """
@@ -108,7 +108,10 @@ class Axis:
         """The position in node units as a formula."""
         shifted = f"{self.name} + {self.offset!r}" if self.offset else self.name
         t = f"log({shifted})" if self.transform == "log" else shifted
-        return f"position = ({t} {'-' if self.start >= 0 else '+'} {abs(self.start)!r}) / {self.step!r}"
+        return (
+            f"position = ({t} {'-' if self.start >= 0 else '+'} {abs(self.start)!r}) / "
+            f"{self.step!r}"
+        )
 
     def attributes(self) -> dict[str, Any]:
         """Attributes of the axis in the file."""
@@ -223,7 +226,7 @@ ATTRIBUTES: tuple[tuple[str, type, Callable[[Any], Any], str], ...] = (
 
 
 def check_attribute(owner: str, name: str, value: Any) -> None:
-    """Raise ValueError if an attribute of a file (`owner` empty) or of a variable does not have its name's type."""
+    """Raise ValueError if an attribute does not have its type; `owner` is empty for a file."""
     expected, good, text = next(
         row[1:] for row in ATTRIBUTES if re.fullmatch(row[0], name)
     )
@@ -271,7 +274,7 @@ def _check_nodes(content: TableContent) -> None:
 
 
 def _check_cells(content: TableContent) -> None:
-    """Raise ValueError unless the cells fill the range in strips of X, in order, each from mu = 0 upwards."""
+    """Raise ValueError unless the cells fill the range in strips of X, from mu = 0 upwards."""
     X, mu = content.axes
     edges: list[FloatArray] = [content.auxiliary[name][1] for name in CELL_EDGES]
     cells = edges[0].size

@@ -1,4 +1,4 @@
-"""Units of length and stress: known units, parsing and conversion of texts such as "0.8 um", units of results.
+"""Units of length and stress: parsing and conversion of texts, units of results.
 
 The same rule applies everywhere. Plain numbers are in the known unit, the surface's or the
 modulus's; texts with a unit are converted to it. A requested unit converts values that have
@@ -20,7 +20,10 @@ from mbma_tables.common.arguments import one_number, positive_array
 from mbma_tables.common.errors import InputError
 
 _POUND_PER_INCH = Fraction("4.4482216152605") / Fraction("0.0254") ** 2
-_LENGTHS = "m=1 km=1e3 cm=1e-2 mm=1e-3 um=1e-6 nm=1e-9 angstrom=1e-10 pm=1e-12 ft=0.3048 in=0.0254 mil=254e-7 uin=254e-10"
+_LENGTHS = (
+    "m=1 km=1e3 cm=1e-2 mm=1e-3 um=1e-6 nm=1e-9 angstrom=1e-10 pm=1e-12 ft=0.3048 "
+    "in=0.0254 mil=254e-7 uin=254e-10"
+)
 _STRESSES = "Pa=1 kPa=1e3 MPa=1e6 GPa=1e9 TPa=1e12 bar=1e5 atm=101325"
 SIZES: dict[str, dict[str, Fraction]] = {
     kind: {
@@ -57,14 +60,15 @@ DIMENSIONS = {
     name: powers
     for powers, names in {
         (1, 0): (
-            "h_rms h_max Ra Rq Rsm Sa Sq Sp longest shortest rolloff separation mean_separation delta R_d R_u "
-            "sigma h_d overclosure separations mean_separations deltas dx dy short_cutoff long_cutoff "
-            "s_filter l_filter extrapolate_to width displacement radius approach reference "
+            "h_rms h_max Ra Rq Rsm Sa Sq Sp longest shortest rolloff separation "
+            "mean_separation delta R_d R_u sigma h_d overclosure separations "
+            "mean_separations deltas dx dy short_cutoff long_cutoff s_filter l_filter "
+            "extrapolate_to width displacement radius approach reference "
             "plane_separation separation_scatter"
         ),
         (0, 1): (
-            "viscosity pressure_drop E_star E E1 E2 hardness elastic_hardness pressure pressures shear mean_pressure "
-            "gas_pressure"
+            "viscosity pressure_drop E_star E E1 E2 hardness elastic_hardness pressure "
+            "pressures shear mean_pressure gas_pressure"
         ),
         (-1, 0): "q0 q1 conductance",
         (-2, 0): "D m4",
@@ -88,7 +92,7 @@ _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(.*)", re.D
 
 
 def known(unit: Any, kind: str = "length") -> str:
-    """A unit's name as this package writes it; the error for an unknown one suggests the nearest."""
+    """A unit's name as this package writes it; an error suggests the nearest name."""
     if not isinstance(unit, str):
         raise InputError(
             f"a unit of {kind} is a text such as {next(iter(SIZES[kind]))!r}, got {unit!r}"
@@ -167,7 +171,7 @@ class Units:
             object.__setattr__(self, kind, known(unit, kind))
 
     def number(self, name: str, value: Any) -> Any:
-        """`value` in these units: plain numbers as they are, "0.8 um" converted, lists entry by entry."""
+        """`value` in these units: numbers as they are, "0.8 um" converted, lists by entry."""
         if isinstance(value, list | tuple):
             flat = list(_entries(value))
             bare = [
@@ -192,7 +196,8 @@ class Units:
                 and stated != own
             ):
                 raise InputError(
-                    f"{name} is in {stated!r} by its attribute units, and asked for in {own!r}: convert it"
+                    f"{name} is in {stated!r} by its attribute units, and asked for in "
+                    f"{own!r}: convert it"
                 )
             return value
         number, unit = read(name, value)
@@ -200,7 +205,8 @@ class Units:
             return number
         if own == "1":
             raise InputError(
-                f"{name} = {value!r} needs a modulus, which is missing: stresses are over E* without one"
+                f"{name} = {value!r} needs a modulus, which is missing: stresses are "
+                "over E* without one"
             )
         if own is None:
             mend = (
@@ -219,7 +225,7 @@ class Units:
         return converted
 
     def conductivities(self, *given: Any) -> tuple[list[Any], str]:
-        """Conductivities and the unit that they have over this unit of length, which is an SI unit of texts."""
+        """Conductivities and their unit over this unit of length, an SI unit for texts."""
         if not any(isinstance(value, str) for value in given):
             return list(given), f"conductivity/{unit_of('separation', self)}"
         found: list[Any] = [_NUMBER.fullmatch(str(value)) for value in given]
@@ -234,7 +240,8 @@ class Units:
             )
         if self.length is None:
             raise InputError(
-                f"conductivity {given[0]!r} beside lengths whose unit is not known: give the surface its unit"
+                f"conductivity {given[0]!r} beside lengths whose unit is not known: give "
+                "the surface its unit"
             )
         return [
             float(each[1]) * factor("m", self.length) for each in found
@@ -247,7 +254,7 @@ UNKNOWN = Units()
 def resolve(
     given: Mapping[str, Any], asked: str | None = None, kind: str = "length"
 ) -> tuple[dict[str, Any], str | None]:
-    """Numbers in one unit of length or stress, and that unit: the one asked for, else the first that is named."""
+    """Numbers in one unit of length or stress, and that unit: as requested, else the first."""
     named = {name: _named(name, value, kind) for name, value in given.items()}
     unit = (
         known(asked, kind)
@@ -262,7 +269,8 @@ def resolve(
         plain = [n for n in given if any(DIMENSIONS.get(n, ())) and named.get(n) is None]
         if plain:
             raise InputError(
-                f"{', '.join(plain)} without a unit beside numbers in {unit}: write the unit to each"
+                f"{', '.join(plain)} without a unit beside numbers in {unit}: write the "
+                "unit to each"
             )
     own = Units(length=unit) if kind == "length" else Units(stress=unit)
     return {name: own.number(name, value) for name, value in given.items()}, unit
@@ -275,7 +283,7 @@ def _entries(value: Any) -> Iterator[Any]:
 
 
 def _named(name: str, value: Any, kind: str) -> str | None:
-    """The unit that a text, the first such in a list, or the attribute units of a DataArray names."""
+    """The unit named by a text, the first in a list, or the attribute of a DataArray."""
     if isinstance(value, list | tuple):
         return next(
             (unit for unit in (_named(name, entry, kind) for entry in value) if unit),
@@ -297,7 +305,10 @@ def require_surface(surface: Any) -> None:
 def modulus_and_units(
     E_star: Any, surface: Any, asked: str | None = None
 ) -> tuple[Any, Units]:
-    """A modulus as a number, and the units of results: the surface's, and the one asked for or named by "100 GPa"."""
+    """A modulus as a number, and the units of results.
+
+    Length is in the surface's unit, stress in the one requested or named by "100 GPa".
+    """
     require_surface(surface)
     stress = known(asked, "stress") if asked else _named("E_star", E_star, "stress")
     # without a modulus, stresses are over it
@@ -358,12 +369,15 @@ def _power(unit: str, power: int) -> str:
 
 
 def unit_of(name: str, units: Units) -> str:
-    """The unit of an argument or quantity by its name, such as "MPa/um"; "1" for numbers without one."""
+    """The unit of an argument or quantity, such as "MPa/um"; "1" for pure numbers."""
     return Dimension(*DIMENSIONS.get(name, (0, 0))).unit(units)
 
 
 def force_over_area(force: Any, area: Any, length: str | None) -> str:
-    """The pressure of a force such as "40 kN", plain numbers in N, on an area [length^2], as a text with its unit."""
+    """The pressure of a force on an area [length^2], as a text with its unit.
+
+    Forces are texts such as "40 kN", or plain numbers in N.
+    """
     number = force
     unit = "N"
     if isinstance(force, str):
@@ -386,7 +400,7 @@ def force_over_area(force: Any, area: Any, length: str | None) -> str:
 
 
 def in_unit(surface: Any, unit: str | None) -> Any:
-    """A surface in the unit asked for: converted from its own unit, or given that unit where it has none."""
+    """A surface in the requested unit: converted, or given that unit if it has none."""
     if unit is None:
         return surface
     return (

@@ -1,4 +1,4 @@
-"""Contact of a sphere or a cylinder with an elastic half-space whose surface layer is a contact law, and its force law.
+"""A sphere or cylinder on an elastic half-space with a contact law as its layer.
 
 At the approach delta from where the smooth bodies would touch, with p = law(u), u = r^2/(2
 R) - delta + w, and w the displacement of the half-space under p: the problem of J. A.
@@ -50,7 +50,7 @@ _FORCE = re.compile(
 
 @functools.lru_cache(maxsize=64)
 def plane_basis(nodes: int) -> Basis:
-    """The basis of pressures that are even in x, at nodes in (0, 1), v = (x/a)^2; w is against a point at x = a.
+    """The basis of pressures even in x, at nodes in (0, 1), v = (x/a)^2; w for x = a.
 
     Of Legendre polynomials of even degree under the kernel -(2/pi) ln|x - s|, by Neumann's
     integral 2 Q_n of P_n.
@@ -74,7 +74,7 @@ def plane_basis(nodes: int) -> Basis:
 
 
 class Solved(NamedTuple):
-    """Solution at one approach: radius of the loaded area, and values at the nodes of a basis of that radius."""
+    """Solution at one approach: radius of the loaded area, and values at its nodes."""
 
     radius: float
     basis: Basis
@@ -91,7 +91,7 @@ class Solved(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Body:
-    """What is pressed, and units of quantities: forces over E* times `newtons` are in the unit of force."""
+    """What is pressed, and units: forces over E* times `newtons` are in the force's unit."""
 
     law: ContactLaw  # of the layer
     radius: float  # R [length]
@@ -104,7 +104,10 @@ class Body:
 
     @functools.cached_property
     def ends(self) -> tuple[float, float]:
-        """Mean separations of the law: at full compression or at the maximum of pressure, and at the end of contact."""
+        """Mean separations between which the layer's law holds.
+
+        That at full compression or at the maximum of pressure, and that at the end of contact.
+        """
         law = self.law
         low = law.lowest if law.turning_point is None else law.turning_point
         return (law.h_max + low) / 2, (
@@ -117,7 +120,10 @@ class Body:
         return math.isinf(self.law.highest)
 
     def layer(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Pressure over E* and -dp/du; zero beyond last contact, the tangent beyond the heaviest load."""
+        """Pressure over E* and -dp/du.
+
+        Both are zero beyond last contact; beyond the heaviest load the law is its tangent.
+        """
         low, high = self.ends
         held = np.clip(u, low, high)
         p, k = self.law.pressure_and_stiffness(held)
@@ -168,7 +174,10 @@ class Body:
         return Solved(radius, known, u, self.layer(u)[0], jacobian, math.inf)
 
     def solved(self, approach: float, rtol: float) -> Solved:
-        """The contact at an approach, with a relative change of force up to `rtol` at the last number of nodes."""
+        """The contact at an approach.
+
+        The last number of nodes changes the force by a relative `rtol` at most.
+        """
         found = self._newton(
             approach, math.sqrt(2 * self.radius * (approach + self.ends[1])), NODES[0]
         )
@@ -183,7 +192,8 @@ class Body:
                 break
         if not error <= max(rtol, self.law.error):
             raise ConvergenceError(
-                f"the force at the approach {approach:.6g} is found to {error:.1g} by {nodes} nodes, not to {rtol:g}"
+                f"the force at the approach {approach:.6g} is found to {error:.1g} by "
+                f"{nodes} nodes, not to {rtol:g}"
             )
         return found._replace(error=error)
 
@@ -209,7 +219,10 @@ class Body:
     @property
     def name(self) -> str:
         """What it is, in words."""
-        return f"{'cylinder' if self.plane else 'sphere'} of radius {self.radius:.10g} {self.units['approach']}"
+        return (
+            f"{'cylinder' if self.plane else 'sphere'} of radius {self.radius:.10g} "
+            f"{self.units['approach']}"
+        )
 
     def smooth_approach(self, force: FloatArray) -> FloatArray:
         """Hertz's approach at a force over E*."""
@@ -219,7 +232,10 @@ class Body:
         return np.asarray(force / math.pi * (2 * np.log(2 * self.reference / a) + 1))
 
     def approach_at(self, force: float) -> float:
-        """Approach at a force over E*: between those of the smooth body, and of one larger by h_max."""
+        """Approach at a force over E*.
+
+        It lies between that of the smooth body, and that of one larger by h_max.
+        """
         from scipy.optimize import brentq
 
         smooth, (thin, wide) = float(self.smooth_approach(np.asarray(force))), self.ends
@@ -294,7 +310,9 @@ def _of(quantity: str, meaning: str) -> Any:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ForceLaw:
-    """Force of a rough sphere or cylinder against its approach, made by `RoughContact.law`; per length of a cylinder.
+    """Force of a rough sphere or cylinder against its approach; per length of a cylinder.
+
+    `RoughContact.law` makes it.
 
     Approaches are numbers in the surface's unit or texts, "0.8 um"; zero force below `first`.
     """

@@ -1,4 +1,4 @@
-"""A rough sphere or cylinder on a flat: force against approach, and the profile of the mean pressure."""
+"""A rough sphere or cylinder on a flat: force, approach, profile of mean pressure."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ WIDEST = 0.1  # contact radius over R, beyond which bodies are no half-spaces
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class RoughContact(Displayed):
-    """A rough sphere or cylinder on a flat, made by `rough_contact`; arrays of the shape of the loads.
+    """A rough sphere or cylinder on a flat, by `rough_contact`; arrays shaped as the loads.
 
     Forces and areas of a cylinder are per length; profiles have 101 places in their last dimension.
     """
@@ -76,8 +76,8 @@ class RoughContact(Displayed):
     stiffness: Numbers = quantity("derivative of force by approach")
     area: Numbers = quantity("real contact area [length^2]")
     contact_radius: Numbers = quantity(
-        "effective contact radius [length]; 3 pi/4 times the mean of r weighted by p dr, Hertz's radius in his contact "
-        "(Greenwood, Tripp 1967)"
+        "effective contact radius [length]; 3 pi/4 times the mean of r weighted by p "
+        "dr, Hertz's radius in his contact (Greenwood, Tripp 1967)"
     )
     position: FloatArray = quantity(
         "distance from the middle [length]; up to the last contact"
@@ -90,16 +90,18 @@ class RoughContact(Displayed):
         "estimate of the relative numerical error of force; including that of the layer's law"
     )
     scatter: Numbers = quantity(
-        "standard deviation of ln F at the approach; from the model uncertainty of the layer's law, and from the mean "
-        "plane below the contact, which depends on the place on the faces"
+        "standard deviation of ln F at the approach; from the model uncertainty of the "
+        "layer's law, and from the mean plane below the contact, which depends on the "
+        "place on the faces"
     )
     valid: Any = quantity(
-        "whether the law was tested for such contacts; at the places that carry nine tenths of the force, for contacts "
-        "wider than 1.5 mean wavelengths and narrower than R/10"
+        "whether the law was tested for such contacts; at the places that carry nine "
+        "tenths of the force, for contacts wider than 1.5 mean wavelengths and narrower "
+        "than R/10"
     )
 
     def law(self, rtol: float = 1e-5) -> ForceLaw:
-        """Force against approach from first contact to the largest approach of these, as polynomials.
+        """Force against approach as polynomials, from first contact to the largest of these.
 
         Parameters
         ----------
@@ -112,8 +114,10 @@ class RoughContact(Displayed):
         >>> from mbma_tables import Surface, rough_contact
         >>> face = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
         >>> ball = rough_contact(face, "5 mm", "110 GPa", approach=["1.5 um"]).law(rtol=1e-3)
-        >>> f"{ball.force('1 um'):.4g} N, {ball.stiffness('1 um'):.3g} N/um, {ball.approach('10 N'):.4g} um"
-        '18.41 N, 17.1 N/um, 0.4478 um'
+        >>> f"{ball.force('1 um'):.4g} N, {ball.stiffness('1 um'):.3g} N/um"
+        '18.41 N, 17.1 N/um'
+        >>> f"{ball.approach('10 N'):.4g} um"
+        '0.4478 um'
         """
         top = float(np.max(self.approach)) + ROUNDING * self.layer.h_max
         return force_law(self._body, top, number_in("rtol", rtol, 1e-6, 0.1))
@@ -176,7 +180,7 @@ def rough_contact(
     reference: float | str | None = None,
     theory: str | Theory | None = None,
 ) -> RoughContact:
-    """Press a rough sphere or cylinder on a flat: an elastic half-space behind the layer of a contact law.
+    """Press a rough sphere or cylinder on a flat: a half-space behind a contact law's layer.
 
     Roughness is a layer whose mean pressure is that of the law at the local mean separation
     (Greenwood and Tripp 1967), so contacts must be wide compared with its longest
@@ -310,7 +314,10 @@ def pressed(body: Body, wanted: FloatArray) -> RoughContact:
 
 
 def _trust(body: Body, found: Solved, force: float) -> tuple[float, list[str]]:
-    """Standard deviation of ln F by that of the law, alike at all places, and reasons against the law."""
+    """Standard deviation of ln F by that of the law, and reasons against the law.
+
+    The law's deviation is alike at all places.
+    """
     law = body.law
     ends = body.ends
     u = np.clip(found.u, *ends)

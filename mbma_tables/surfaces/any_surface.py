@@ -1,4 +1,4 @@
-"""Base class of surfaces: moments, summits, the sum of two surfaces, functions of surfaces that are DataArrays."""
+"""Base class of surfaces: moments, summits, the sum of two, functions of DataArrays."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ MEANINGS = {
 
 
 def _doubts(provenance: Iterable[Mapping[str, Any]]) -> Iterator[str]:
-    """Texts "not_valid" of the records of a surface, and of those that it was combined or averaged from."""
+    """Texts "not_valid" of a surface's records, and of those that it was made from."""
     for record in provenance:
         if "not_valid" in record:
             yield record["not_valid"]
@@ -77,12 +77,12 @@ class AnySurface(Displayed, abc.ABC):
         return False
 
     def departures(self, by_map: bool = False) -> tuple[str, ...]:
-        """Reasons why it is neither the isotropic Gaussian surface of theories nor similar to those simulated."""
+        """Reasons why it is unlike both the isotropic Gaussian surface and those simulated."""
         return self.doubts
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Reasons why its measurement may not represent the surface, whatever the theory; each with a remedy."""
+        """Reasons why its measurement may not represent the surface; each with a remedy."""
         return tuple(dict.fromkeys(_doubts(self.provenance)))
 
     def with_numbers(self, *numbers: Any) -> Self:
@@ -123,7 +123,10 @@ class AnySurface(Displayed, abc.ABC):
 
     @property
     def resolution(self) -> str:
-        """Shortest wavelength of a measured surface, and the influence of shorter ones; empty for other surfaces."""
+        """Shortest wavelength of a measured surface, and what shorter ones change.
+
+        Empty for a surface that was not measured.
+        """
         told = [
             entry["told"]
             for entry in self.provenance
@@ -237,7 +240,7 @@ class AnySurface(Displayed, abc.ABC):
 
 
 def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
-    """The tuple of results of `function` for broadcast arguments, block by block for dask arrays."""
+    """The results of `function` for broadcast arguments, block by block for dask arrays."""
     # xarray is imported already if its objects are passed
     import xarray as xr
 
@@ -284,7 +287,10 @@ def agree(**arguments: Any) -> None:
 def apply_to_surface(
     answer: Any, surface: AnySurface, arrays: Mapping[str, Any], outputs: int
 ) -> Any:
-    """``answer(surface, *arrays)``, a tuple of `outputs` arrays, of DataArrays; plain arrays among them are errors."""
+    """``answer(surface, *arrays)``, a tuple of `outputs` arrays, of DataArrays.
+
+    A plain array among DataArrays is an error.
+    """
     count = len(surface.parameters)
     arguments = {name: getattr(surface, name) for name in surface.parameters} | dict(
         arrays

@@ -1,4 +1,7 @@
-"""Reading of measured maps and line scans: files, arrays, topographies of SurfaceTopography (the extra `maps`)."""
+"""Reading of measured maps and line scans from files, arrays and topographies.
+
+Most formats are read by SurfaceTopography (the extra `maps`).
+"""
 
 import contextlib
 import io
@@ -42,8 +45,9 @@ def read_measurement(
     unit: str | None = None,
     channel: int | None = None,
 ) -> Any:
-    """The topography or line scan in a file: any format of SurfaceTopography, and text; "-" is stdin.
+    """The topography or line scan in a file of any format of SurfaceTopography, or text.
 
+    The path "-" is standard input.
     Sampling steps, in `unit`, are of files that have none, and so is the unit. A list of
     points may name units in the header of its columns, like "x [um]". Rows of a matrix
     without lengths are x, as those of an array. Numbers of a text are separated by
@@ -55,7 +59,8 @@ def read_measurement(
     piped = os.fspath(path) == "-"
     if not piped and not os.path.isfile(place):
         raise InputError(
-            f"there is no file {os.fspath(path)!r}{': it is a folder' if os.path.isdir(place) else ''}"
+            "there is no file "
+            f"{os.fspath(path)!r}{': it is a folder' if os.path.isdir(place) else ''}"
         )
     suffix = place.suffix.lower()
     with warnings.catch_warnings():
@@ -118,7 +123,7 @@ def _refuse_infinite(reader: Any, stream: Any, name: str) -> None:
 
 
 def _plain_matrix(path: pathlib.Path, why: str) -> bytes:
-    """A matrix of numbers with any separator and decimal mark, converted to that library's plain text.
+    """A matrix of numbers with any separator and decimal mark, as that library's plain text.
 
     `why` says what that library found wrong with the file.
     """
@@ -138,8 +143,8 @@ def _plain_matrix(path: pathlib.Path, why: str) -> bytes:
         numbers = numbers_of([" ".join(row) for row in rows], None)
     except InputError as fault:
         raise InputError(
-            f"{path.name} cannot be read as a map ({why}): it must hold numbers with one separator between them, "
-            f"semicolons, tabs, blanks or commas: {fault}"
+            f"{path.name} cannot be read as a map ({why}): it must hold numbers with one "
+            f"separator between them, semicolons, tabs, blanks or commas: {fault}"
         ) from None
     if np.isinf(numbers).any():
         raise InputError(
@@ -182,8 +187,8 @@ def _separated(lines: Sequence[str], name: str) -> list[list[str]]:
     if any("," in number for number in every):
         if points or any(number.count(",") > 1 for number in every):
             raise InputError(
-                f"{name} has commas inside numbers that also hold points, or several commas: write decimal points, "
-                "and no separators of thousands"
+                f"{name} has commas inside numbers that also hold points, or several "
+                "commas: write decimal points, and no separators of thousands"
             )
         rows = [[number.replace(",", ".") for number in row] for row in rows]
     return rows
@@ -209,13 +214,13 @@ def _refuse_ambiguous(rows: Sequence[Sequence[str]], name: str) -> None:
     )
     if padded or alike:
         raise InputError(
-            f"{name} has commas only: it cannot be told whether they separate numbers or are decimal commas. Write "
-            "decimal points, or semicolons between the numbers"
+            f"{name} has commas only: it cannot be told whether they separate numbers or "
+            "are decimal commas. Write decimal points, or semicolons between the numbers"
         )
 
 
 def _units_of_header(content: bytes) -> list[str]:
-    """Units in brackets, as instruments write them beside the names of columns, above the numbers of a text."""
+    """Units in brackets beside the names of columns, above the numbers of a text."""
     found: list[str] = []
     # no text has zero bytes; what is no UTF-8 is the micro sign of Latin-1
     text = (
@@ -270,8 +275,9 @@ def _channel_of(
     if chosen.physical_sizes is None:
         if min(chosen.nb_grid_pts) in LISTS:
             raise InputError(
-                f"{path.name} holds {' x '.join(map(str, chosen.nb_grid_pts))} numbers. A list of x, y and height is "
-                "read where its points fill a grid: give missing ones a row with NaN, or write a matrix"
+                f"{path.name} holds {' x '.join(map(str, chosen.nb_grid_pts))} numbers. "
+                "A list of x, y and height is read where its points fill a grid: give "
+                "missing ones a row with NaN, or write a matrix"
             )
         if dx is None:
             raise InputError(f"{path.name} has no lengths: give the sampling step dx")
@@ -338,8 +344,8 @@ def grid_of(
             else "Surface.from_map takes maps"
         )
         raise InputError(
-            f"a topography must have heights along {dimensions} axes and as many physical_sizes, got shape "
-            f"{np.shape(grid)} and {sizes}; {other}"
+            f"a topography must have heights along {dimensions} axes and as many "
+            f"physical_sizes, got shape {np.shape(grid)} and {sizes}; {other}"
         )
     extent = finite_array("physical_sizes", sizes)
     allowed = "in [1e-30, 1e30], x and y rising"
@@ -355,14 +361,15 @@ def grid_of(
 
 
 def heights_of(grid: Any, dimensions: int = 2) -> Any:
-    """Heights as a masked array of floats, NaN being undefined; an error if they are infinite or not numbers."""
+    """Heights as a masked array of floats, NaN being undefined; infinite ones are errors."""
     try:
         values = np.ma.asanyarray(grid)
     except (TypeError, ValueError) as fault:
         raise InputError(f"heights must be an array of numbers: {fault}") from None
     if values.ndim != dimensions:
         raise InputError(
-            f"heights must be {('one', 'two')[dimensions - 1]}-dimensional, got shape {values.shape}"
+            f"heights must be {('one', 'two')[dimensions - 1]}-dimensional, got shape "
+            f"{values.shape}"
         )
     if values.dtype.kind not in "fiu":
         raise InputError(f"heights must be real numbers: entries of type {values.dtype}")

@@ -282,8 +282,11 @@ class SelfAffine(AnySurface):
         Examples
         --------
         >>> from mbma_tables import Surface
-        >>> ground = Surface.from_roughness(Ra="0.4 um", Rdq=0.1, longest="100 um", hurst=0.8, h_max="1.8 um")
-        >>> print(f"h_rms = {ground.h_rms:.3f} um, shortest wavelength {6.2832 / ground.q1:.2f} {ground.unit}")
+        >>> ground = Surface.from_roughness(
+        ...     Ra="0.4 um", Rdq=0.1, longest="100 um", hurst=0.8, h_max="1.8 um"
+        ... )
+        >>> shortest = 6.2832 / ground.q1
+        >>> print(f"h_rms = {ground.h_rms:.3f} um, shortest wavelength {shortest:.2f} um")
         h_rms = 0.501 um, shortest wavelength 1.12 um
         >>> ground.provenance[0]["assumed"][2]
         'h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered'
@@ -352,7 +355,7 @@ class SelfAffine(AnySurface):
         return type(self)(*numbers, unit=self.unit, provenance=records)
 
     def power_spectrum(self, q: ArrayLike) -> Any:
-        """C(q) of Eq. (6) [length^4], zero outside [q0, q1]; for one surface or broadcasting against it."""
+        """C(q) of Eq. (6) [length^4], zero outside [q0, q1]; a batch broadcasts against q."""
         wavenumber = positive_array("q", q)
         scale = self.hurst / math.pi * (self.s / self.q0) ** 2
         inside = (wavenumber >= self.q0) & (wavenumber <= self.q1)

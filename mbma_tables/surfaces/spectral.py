@@ -70,7 +70,9 @@ NO_MAP: dict[str, Any] = {
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SpectralSurface(AnySurface):
-    """A surface given by its isotropic spectrum; `Surface.from_spectrum`, `from_map` and `combined` make one.
+    """A surface given by its isotropic spectrum.
+
+    `Surface.from_spectrum`, `Surface.from_map` and `AnySurface.combined` make one.
 
     Parameters
     ----------
@@ -120,7 +122,8 @@ class SpectralSurface(AnySurface):
     >>> q = np.geomspace(0.2, 50, 200)  # a plateau up to 1, then H = 0.8
     >>> surface = Surface.from_spectrum(q, 0.01 * np.minimum(1, q**-3.6), h_max=1.1, unit="um")
     >>> surface
-    MeasuredSurface(200 samples from q = 0.2 to 50, h_rms=0.2634, h_max=1.1, rms gradient 0.7808, unit='um')
+    MeasuredSurface(200 samples from q = 0.2 to 50, h_rms=0.2634, h_max=1.1,
+                    rms gradient 0.7808, unit='um')
     """
 
     q: Any
@@ -191,7 +194,8 @@ class SpectralSurface(AnySurface):
             heights = None if heights is None or heights.is_gaussian else heights
         if heights is None and top is None:
             raise InputError(
-                "h_max is missing: the highest point above the mid-plane, heights= of the surface, or nominal_area"
+                "h_max is missing: the highest point above the mid-plane, heights= of "
+                "the surface, or nominal_area"
             )
         top = (
             heights.h_max
@@ -202,9 +206,15 @@ class SpectralSurface(AnySurface):
         vars(self).update(heights=heights, h_max=top, provenance=provenance)
 
     def __repr__(self) -> str:
-        numbers = f"h_rms={self.h_rms:.4g}, h_max={self.h_max:.4g}, rms gradient {self.rms_gradient:.4g}"
+        numbers = (
+            f"h_rms={self.h_rms:.4g}, h_max={self.h_max:.4g}, rms gradient "
+            f"{self.rms_gradient:.4g}"
+        )
         unit = "" if self.unit is None else f", unit={self.unit!r}"
-        return f"{type(self).__name__}({self.q.size} samples from q = {self.q0:.4g} to {self.q1:.4g}, {numbers}{unit})"
+        return (
+            f"{type(self).__name__}({self.q.size} samples from q = {self.q0:.4g} to "
+            f"{self.q1:.4g}, {numbers}{unit})"
+        )
 
     def _variables(self) -> dict[str, Variable]:
         length = self.unit or "length"
@@ -236,7 +246,7 @@ class SpectralSurface(AnySurface):
 
     @functools.cached_property
     def hurst(self) -> float | None:
-        """Hurst exponent of a spectrum that is one power law within a percent; None of any other."""
+        """Hurst exponent of a spectrum that is one power law within a percent; else None."""
         x = np.log(self.q)
         y = np.log(np.maximum(self.C, np.finfo(float).tiny))
         slope, level = np.polyfit(x, y, 1)
@@ -250,10 +260,10 @@ class SpectralSurface(AnySurface):
 
     @functools.cached_property
     def longest(self) -> float:
-        """Wavenumber q_L from which a band as wide as the largest islands' holds most height [1/length].
+        """Wavenumber q_L from which a band holds most height [1/length].
 
-        The lowest of a self-affine spectrum, near the roll-off of one with a plateau.
-        MBMA's floors refer to it.
+        The band is as wide as that of the largest islands. q_L is the lowest wavenumber of a
+        self-affine spectrum, near the roll-off of one with a plateau. MBMA's floors refer to it.
         """
         q = np.unique(np.append(self.q, np.geomspace(self.q0, self.q1, SCAN)))[:-1]
         start = self.laws.place(q)
@@ -261,7 +271,10 @@ class SpectralSurface(AnySurface):
         return float(q[self.laws.between(0, start, end).argmax()])
 
     def departures(self, by_map: bool = False) -> tuple[str, ...]:
-        """Reasons why it is unlike the surfaces compared with BEM, as a map or as an isotropic Gaussian one."""
+        """Reasons why it is unlike the surfaces compared with BEM.
+
+        These were maps, or isotropic Gaussian surfaces.
+        """
         return (*self.doubts, *self.outside(BY_MAP if by_map else BY_SPECTRUM, by_map))
 
     def outside(
@@ -307,7 +320,10 @@ class SpectralSurface(AnySurface):
         return dataclasses.replace(self.resized(factor, factor), unit=unit)
 
     def resized(self, up: float, along: float) -> Self:
-        """The surface with its heights `up` times as large, and its lengths along the plane `along` times."""
+        """The surface with heights `up` times as large.
+
+        Lengths along the plane are `along` times as large.
+        """
         known = self.bearing
         bands = self.bands
         whole = self.map
@@ -339,7 +355,10 @@ class SpectralSurface(AnySurface):
         )
 
     def between(self, low: float, high: float) -> Self:
-        """The wavelengths from one wavenumber to another, without the curves of a map; heights shrink in proportion."""
+        """The wavelengths from one wavenumber to another; heights shrink in proportion.
+
+        The curves of a map are left out.
+        """
         inside = (self.q > low) & (self.q < high)
         q = np.concatenate([[low], self.q[inside], [high]])
         C = np.concatenate(
@@ -354,8 +373,8 @@ class SpectralSurface(AnySurface):
         """The equivalent surface of two; see `AnySurface.combined`."""
         if (self.unit is None) != (other.unit is None):
             raise InputError(
-                f"one surface is in {self.unit or other.unit!r}, the unit of the other is not known: "
-                "make it with unit=..."
+                f"one surface is in {self.unit or other.unit!r}, the unit of the other "
+                "is not known: make it with unit=..."
             )
         if self.unit is not None:
             other = other.to(self.unit)
@@ -374,7 +393,8 @@ class SpectralSurface(AnySurface):
         stretch = None
         if self.bearing is not None or other.bearing is not None:
             told.append(
-                "curves of the maps' summits and valleys are not used: the relative position of the maps is not known"
+                "curves of the maps' summits and valleys are not used: the relative "
+                "position of the maps is not known"
             )
         if self.anisotropy is not None or other.anisotropy is not None:
             # the largest of a sum: parallel, their tensors of mean gradients have the same axes
@@ -406,7 +426,7 @@ class SpectralSurface(AnySurface):
         return both.resolved() if self.resolution or other.resolution else both
 
     def resolved(self) -> Self:
-        """The same measured surface, with a record of the influence of its shortest octave of wavelengths."""
+        """The same measured surface, with a record of what its shortest octave contributes."""
         unit = f" {self.unit}" if self.unit else ""
         # the map may be sampled more finely than its shortest wavelength
         shortest = self.shortest(NO_POWER)
@@ -421,11 +441,15 @@ class SpectralSurface(AnySurface):
             else ""
         )
         told = (
-            f"area depends on resolution: wavelengths are known down to {shortest:.4g}{unit}{finer}, and without the "
-            f"last octave of them the rms gradient would be {gradient:.2f} times as large"
+            "area depends on resolution: wavelengths are known down to "
+            f"{shortest:.4g}{unit}{finer}, and without the last octave of them the rms "
+            f"gradient would be {gradient:.2f} times as large"
         )
         if self.map is not None:
-            told += f"; a simulation with short_cutoff={2 * shortest:.4g} gives the area without them"
+            told += (
+                f"; a simulation with short_cutoff={2 * shortest:.4g} gives the area "
+                "without them"
+            )
         record = {
             "step": "resolution",
             "shortest": shortest,

@@ -19,8 +19,9 @@ from mbma_tables.surfaces.spectral import SpectralSurface
 from mbma_tables.surfaces.treatment import OPTIONS
 
 UNNAMED = (
-    "the convention of the spectrum is not named: give Surface.from_spectrum(..., convention='paper') if h_rms^2 is "
-    "2 pi integral C q dq, or convention='isotropic' if it is integral C q dq/(2 pi), as of most programs"
+    "the convention of the spectrum is not named: give Surface.from_spectrum(..., "
+    "convention='paper') if h_rms^2 is 2 pi integral C q dq, or convention='isotropic' "
+    "if it is integral C q dq/(2 pi), as of most programs"
 )
 
 
@@ -121,13 +122,15 @@ class Surface(SelfAffine):
         >>> from mbma_tables import Surface
         >>> q = np.geomspace(1, 100, 40)
         >>> surface = Surface.from_spectrum(q, 1e-3 * q**-3.4, h_max=0.3, convention="paper")
-        >>> print(f"h_rms = {surface.h_rms:.4f}, rms gradient {surface.rms_gradient:.3f}, alpha = {surface.alpha:.1f}")
-        h_rms = 0.0669, rms gradient 0.394, alpha = 106.5
+        >>> print(f"h_rms = {surface.h_rms:.4f}, rms gradient {surface.rms_gradient:.3f}")
+        h_rms = 0.0669, rms gradient 0.394
+        >>> print(f"alpha = {surface.alpha:.1f}")
+        alpha = 106.5
         """
         if convention not in (None, "paper", "isotropic"):
             raise InputError(
-                "convention must be 'paper' or 'isotropic' (of a trace, give the trace to Surface.from_profile), "
-                f"got {convention!r}"
+                "convention must be 'paper' or 'isotropic' (of a trace, give the trace "
+                f"to Surface.from_profile), got {convention!r}"
             )
         if np.ma.is_masked(C) and np.shape(q) == np.shape(C):
             shown = ~np.ma.getmaskarray(np.ma.asanyarray(C))
@@ -167,7 +170,7 @@ class Surface(SelfAffine):
         unit: str | None = None,
         channel: int | None = None,
     ) -> Surface | MeasuredSurface:
-        """The surface of a measured height map: its own spectrum and heights, or the self-affine one fitted to it.
+        """The surface of a measured map: its spectrum and heights, or a self-affine fit.
 
         Parameters
         ----------
@@ -221,8 +224,10 @@ class Surface(SelfAffine):
         >>> q[0, 0] = np.inf
         >>> heights = np.fft.irfft2(noise / abs(noise) * q**-1.8)
         >>> surface = Surface.from_map(heights, dx=1 / 128, periodic=True, model="self-affine")
-        >>> print(f"H = {surface.hurst:.2f}, q0 = {surface.q0:.3f}, fitted at {surface.fit.points} points")
-        H = 0.80, q0 = 6.283, fitted at 32 points
+        >>> print(f"H = {surface.hurst:.2f}, q0 = {surface.q0:.3f}")
+        H = 0.80, q0 = 6.283
+        >>> surface.fit.points  # of the spectrum
+        32
         """
         treatment = {name: value for name, value in locals().items() if name in OPTIONS}
         from mbma_tables.surfaces.maps import measured_surface, prepared
@@ -281,7 +286,8 @@ class Surface(SelfAffine):
         >>> line = np.fft.irfft(noise * np.minimum(1, (np.arange(2001) / 40.0 + 1e-9) ** -1.3))
         >>> surface = Surface.from_profile(line, dx=0.5, unit="um", periodic=True)
         >>> print(surface.provenance[-3]["told"])
-        h_rms is known to 5.2% and the rms gradient to 1.4% (one standard error, of a Gaussian surface)
+        h_rms is known to 5.2% and the rms gradient to 1.4%
+        (one standard error, of a Gaussian surface)
         """
         from mbma_tables.surfaces.maps import measured_surface, prepared
 
@@ -293,7 +299,7 @@ class Surface(SelfAffine):
         )
 
     def sampled(self) -> MeasuredSurface:
-        """The same surface given by its spectrum, of which two samples suffice; not available for a batch."""
+        """The same surface by its spectrum, of which two samples suffice; not for a batch."""
         if self.labelled or self.shape != ():
             raise InputError("a batch has no single spectrum: take one surface at a time")
         ends = np.array([self.q0, self.q1])
@@ -346,7 +352,8 @@ class MeasuredSurface(SpectralSurface):
         --------
         >>> import numpy as np
         >>> from mbma_tables import Surface
-        >>> face = Surface.from_spectrum(q := np.geomspace(0.2, 50, 60), np.maximum(q, 1) ** -3.6, h_max=9.0)
+        >>> q = np.geomspace(0.2, 50, 60)
+        >>> face = Surface.from_spectrum(q, np.maximum(q, 1) ** -3.6, h_max=9.0)
         >>> print(f"H = {face.fit().hurst:.2f} from q = {face.fit().q0:.2f}")
         H = 0.80 from q = 1.00
         """
@@ -362,7 +369,7 @@ class MeasuredSurface(SpectralSurface):
 
 
 def assumptions(surface: Any) -> list[str]:
-    """What a surface, and the faces that it combines, assume beyond the numbers given, each line once."""
+    """What a surface and the faces that it combines assume, each line once."""
     lines = dict.fromkeys(_assumed(surface.provenance))
     if isinstance(surface, Surface) and ASSUMED not in lines:
         return [ASSUMED, *lines]

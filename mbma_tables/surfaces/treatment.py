@@ -1,4 +1,7 @@
-"""Measured maps and line scans, treated in the terms of SurfaceTopography (the extra `maps`), each step on record."""
+"""Treatment of measured maps and line scans, with a record of each step.
+
+Options have the names of SurfaceTopography (the extra `maps`).
+"""
 
 from __future__ import annotations
 
@@ -57,9 +60,10 @@ OTHER_SPIKES = 2
 # at random, pressures at a gap change by up to 0.3%, and by 0.7 to 5% with 1 to 3% missing
 # in patches, more than the scatter of a simulation
 MOST_FILLED = 1e-3
-# a line between two rows is a seam if the median step across it is this many times those beside it, and all but those
-# of so many seams, and as large as what the step varies by along the line: on 130 maps of machined surfaces, at most
-# 1.7 and 1.2 times; lines of scanning probes jump too, but many of them
+# a line between two rows is a seam if the median step across it is this many times those
+# beside it, and all but those of so many seams, and as large as what the step varies by along
+# the line: on 130 maps of machined surfaces, at most 1.7 and 1.2 times; lines of scanning
+# probes jump too, but many of them
 SEAM = 2.5
 SEAM_SPREAD = 1.0
 MOST_SEAMS = 3
@@ -160,15 +164,16 @@ class Treated:
         )
 
     def history(self, *notes: Mapping[str, Any], more: str = "") -> Provenance:
-        """All steps of a surface made of it: reading, treatment, what was done at the edges, and notes."""
+        """All steps of a surface made of it: reading, treatment, its edges, and notes."""
         shape = self.heights.shape
         unit = f" {self.unit}" if self.unit else ""
         sides = " x ".join(
             f"{count * step:.4g}" for count, step in zip(shape, self.steps, strict=True)
         )
         told = (
-            f"{'map' if len(shape) == 2 else 'line scan'} of {' x '.join(map(str, shape))} points, {sides}{unit}, "
-            f"heights read in {self.unit or 'the same unit, which is not known'}"
+            f"{'map' if len(shape) == 2 else 'line scan'} of "
+            f"{' x '.join(map(str, shape))} points, {sides}{unit}, heights read in "
+            f"{self.unit or 'the same unit, which is not known'}"
         )
         read = {
             "step": "read",
@@ -183,7 +188,10 @@ class Treated:
         return (read, *self.provenance, {"step": "edges", "kind": edges}, *notes)
 
     def windowed(self) -> FloatArray:
-        """Heights under a Hann window of unit mean square, their mean under it removed; as they are where periodic."""
+        """Heights under a Hann window of unit mean square, without their mean under it.
+
+        Periodic heights are returned as they are.
+        """
         if self.periodic:
             return np.asarray(self.heights)
         windows = [
@@ -253,7 +261,10 @@ def _flattened(known: Treated, mode: str | None) -> Treated:
             else 0.0
         )
         if share > FORM:
-            told += f"; a {form} has {share:.0%} of the height variance: detrend={remedy!r} removes it"
+            told += (
+                f"; a {form} has {share:.0%} of the height variance: detrend={remedy!r} "
+                "removes it"
+            )
             break
     removed = None if trend in ("mean", "plane") else heights - flat
     known = known.after(
@@ -310,14 +321,15 @@ def _without_outliers(known: Treated, asked: float | None) -> Treated:
     if spikes == 0 or heights.ndim == 1:
         return known.after(heights, "outliers seen", told, points=count)
     reason = (
-        f"{_counted(spikes, heights.size)} are spikes, on which contact would begin: outliers={limit:g} removes them, "
-        f"as in Surface.from_map(..., outliers={limit:g})"
+        f"{_counted(spikes, heights.size)} are spikes, on which contact would begin: "
+        f"outliers={limit:g} removes them, as in Surface.from_map(..., "
+        f"outliers={limit:g})"
     )
     return known.after(heights, "outliers seen", told, points=count, not_valid=reason)
 
 
 def _isolated(values: FloatArray, median: FloatArray, periodic: bool) -> Any:
-    """Points of a map unlike nearly all of their neighbours, for which an edge or a small pillar is not mistaken."""
+    """Points of a map unlike nearly all of their neighbours: neither edges nor pillars."""
     if values.ndim == 1:
         return np.zeros(values.shape, bool)
     wide = np.pad(values, 1, "wrap" if periodic else "reflect")
@@ -333,7 +345,10 @@ def _isolated(values: FloatArray, median: FloatArray, periodic: bool) -> Any:
 
 
 def _without_seams(known: Treated) -> Treated:
-    """The same heights, with a record of a step along a whole row or column, as where two images were joined."""
+    """The same heights, with a record of a step along a whole row or column.
+
+    Such a step arises where two images were joined.
+    """
     heights = np.asarray(known.heights)
     if heights.ndim == 1:
         return known
@@ -352,12 +367,13 @@ def _without_seams(known: Treated) -> Treated:
         place = int(np.argmax(np.where(seams, size, 0.0)))
         unit = f" {known.unit}" if known.unit else ""
         told = (
-            f"the heights step by {across[place]:.4g}{unit} between {name} {place} and {place + 1}, as where two "
-            "images were joined at different levels"
+            f"the heights step by {across[place]:.4g}{unit} between {name} {place} and "
+            f"{place + 1}, as where two images were joined at different levels"
         )
         parts = (":, " * axis) + f":{place + 1}", (":, " * axis) + f"{place + 1}:"
         reason = (
-            f"{told}: give each part as a map of its own, Surface.from_map(heights[{parts[0]}], ...) and "
+            f"{told}: give each part as a map of its own, "
+            f"Surface.from_map(heights[{parts[0]}], ...) and "
             f"Surface.from_map(heights[{parts[1]}], ...)"
         )
         return known.after(
@@ -381,18 +397,19 @@ def _filled(known: Treated, fill: str | None) -> Treated:
         return dataclasses.replace(known, heights=_harmonic(known))
     if share > FREE_HOLES and fill is None:
         raise InputError(
-            f"the map has {count} holes among {size} points, more than {FREE_HOLES:.0%}: fill them, smooth, "
-            "with fill='harmonic', or cut them out"
+            f"the map has {count} holes among {size} points, more than {FREE_HOLES:.0%}: "
+            "fill them, smooth, with fill='harmonic', or cut them out"
         )
     told = (
-        f"{_counted(count, size)} were undefined and are filled harmonically: smooth there, the map lacks "
-        "about as large a share of its mean squared gradient"
+        f"{_counted(count, size)} were undefined and are filled harmonically: smooth "
+        "there, the map lacks about as large a share of its mean squared gradient"
     )
     more = {}
     if share > MOST_FILLED and heights.ndim == 2:
         more["not_valid"] = (
-            f"{share:.2g} of the points are filled, more than {MOST_FILLED:g}: contact and gaps there were not "
-            "measured. Cut out a part without holes, Surface.from_map(heights[i:j, k:l], ...), or measure again"
+            f"{share:.2g} of the points are filled, more than {MOST_FILLED:g}: contact "
+            "and gaps there were not measured. Cut out a part without holes, "
+            "Surface.from_map(heights[i:j, k:l], ...), or measure again"
         )
     return known.after(
         _harmonic(known),
@@ -411,8 +428,8 @@ def _within(known: Treated, treatment: Treatment) -> Treated:
     short = treatment.short_cutoff
     if short is not None and not short > 2 * min(known.steps):
         raise InputError(
-            f"short_cutoff must be longer than two sampling steps, {2 * min(known.steps):.4g}, the shortest wavelength "
-            f"sampled, got {short:g}"
+            "short_cutoff must be longer than two sampling steps, "
+            f"{2 * min(known.steps):.4g}, the shortest wavelength sampled, got {short:g}"
         )
     if short is not None and long is not None and not long > short:
         raise InputError(
@@ -441,7 +458,10 @@ def _within(known: Treated, treatment: Treatment) -> Treated:
         length = f"{wavelength:.4g} {known.unit or ''}".rstrip()
         told = f"{CALLED[name]} at {length} removes {of_gradient:.0%} of the squared gradient"
         if name in ("short_cutoff", "s_filter"):
-            told += f": the rms gradient is {math.sqrt(after[1] / before[1]):.2f} times that without"
+            told += (
+                f": the rms gradient is {math.sqrt(after[1] / before[1]):.2f} times that "
+                "without"
+            )
         told += f"; it removes {of_variance:.0%} of the height variance"
         known = known.after(
             values,
@@ -455,7 +475,10 @@ def _within(known: Treated, treatment: Treatment) -> Treated:
 
 
 def without_polynomial(heights: FloatArray, degree: int) -> FloatArray:
-    """Heights less their least-squares polynomial of that total degree: same as SurfaceTopography's modes."""
+    """Heights less their least-squares polynomial of that total degree.
+
+    The same as the modes of SurfaceTopography.
+    """
     bases = [
         np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1, 1, count), degree))[
             0
@@ -519,7 +542,7 @@ def squares(
     steps: tuple[float, ...],
     band: tuple[float, float] = (0.0, math.inf),
 ) -> tuple[float, float]:
-    """Mean squares of periodic heights and of their gradient, of the wavelengths between two wavenumbers."""
+    """Mean squares of periodic heights and gradient, between two wavenumbers."""
     power = np.abs(np.fft.fftn(values) / values.size) ** 2
     power.flat[0] = 0.0
     q2 = _squared_waves(values.shape, steps)
