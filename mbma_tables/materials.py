@@ -126,11 +126,11 @@ def effective_modulus(
     ratios = [_poisson(name, plain[name]) for name in ("nu1", "nu2")]
     broadcast_shape(E1=moduli[0], nu1=ratios[0], E2=moduli[1], nu2=ratios[1])
     a, b = ((1 - nu) * (1 + nu) / E for nu, E in zip(ratios, moduli, strict=True))
-    found = (1 / (a + b))[()]
+    modulus = (1 / (a + b))[()]
     return (
-        found
+        modulus
         if unit is None or not isinstance(E1, str)
-        else f"{one_number('E_star', found)} {unit}"
+        else f"{one_number('E_star', modulus)} {unit}"
     )
 
 
@@ -308,36 +308,39 @@ def get(name: str) -> Metal:
     ('aluminium 6061 hard', 'aluminium 6061')
     """
     words = _words(str(name))
-    known = _NAMES.get(words)
-    if known is None:
+    full_name = _NAMES.get(words)
+    if full_name is None:
         # the last word may be the temper
         for temper in TEMPERS:
             rest = list(words)
             if temper in rest:
                 rest.remove(temper)
                 plain = _NAMES.get(tuple(rest))
-                known = f"{plain} {temper}" if plain in _METALS else known
-    if known is None:
+                full_name = f"{plain} {temper}" if plain in _METALS else full_name
+    if full_name is None:
         raise InputError(
             f"no metal is named {name!r}: give {_alike(str(name))}, perhaps with ' soft' "
             "or ' hard', or a Metal"
         )
-    plain, _, temper = known.rpartition(" ")
+    plain, _, temper = full_name.rpartition(" ")
     if plain in _METALS and temper in TEMPERS:
         one = _METALS[plain].hardness[TEMPERS.index(temper)]
-        return dataclasses.replace(_METALS[plain], name=known, hardness=(one, one))
-    return _METALS[known]
+        return dataclasses.replace(_METALS[plain], name=full_name, hardness=(one, one))
+    return _METALS[full_name]
 
 
 def _alike(name: str) -> str:
     """Names of metals that share a word with a name or are spelt like it, or all of them."""
     words = _words(name)
     spelt = difflib.get_close_matches(
-        " ".join(words), [" ".join(known) for known in _NAMES], 3, 0.6
+        " ".join(words), [" ".join(words_of_metal) for words_of_metal in _NAMES], 3, 0.6
     )
     alike: dict[str, None] = {}
-    for known, metal in _NAMES.items():
-        if set(words) & set(known) - set(TEMPERS) or " ".join(known) in spelt:
+    for words_of_metal, metal in _NAMES.items():
+        if (
+            set(words) & set(words_of_metal) - set(TEMPERS)
+            or " ".join(words_of_metal) in spelt
+        ):
             alike[metal.removesuffix(" soft").removesuffix(" hard")] = None
     return ", ".join(alike or METALS)
 
@@ -396,32 +399,32 @@ def pair(
     """
     if isinstance(materials, Pair):
         return materials
-    given: Sequence[Any] = (
+    metals: Sequence[Any] = (
         materials if isinstance(materials, tuple | list) else [materials]
     )
-    if len(given) not in (1, 2):
-        raise InputError(f"materials are one or two, got {len(given)}")
-    return Pair((_metal(given[0]), _metal(given[-1])))
+    if len(metals) not in (1, 2):
+        raise InputError(f"materials are one or two, got {len(metals)}")
+    return Pair((_metal(metals[0]), _metal(metals[-1])))
 
 
-def _metal(given: Any) -> Metal:
+def _metal(metal: Any) -> Metal:
     """A metal by its name, as it is, or of its constants by name."""
-    if isinstance(given, Metal):
-        return given
-    if not isinstance(given, Mapping):
-        return get(given)
+    if isinstance(metal, Metal):
+        return metal
+    if not isinstance(metal, Mapping):
+        return get(metal)
     fields = {field.name: field.default for field in dataclasses.fields(Metal)}
     missing = [
         name
         for name, default in fields.items()
-        if default is dataclasses.MISSING and name not in given
+        if default is dataclasses.MISSING and name not in metal
     ]
-    unknown = [str(name) for name in given if name not in fields]
+    unknown = [str(name) for name in metal if name not in fields]
     if missing or unknown:
         wrong = [f"{', '.join(missing)} missing"] if missing else []
         wrong += [f"{', '.join(unknown)} unknown"] if unknown else []
         raise InputError(f"a metal has {', '.join(fields)}: {' and '.join(wrong)}")
-    return Metal(**given)
+    return Metal(**metal)
 
 
 def hardness(given: str) -> str:
@@ -462,21 +465,21 @@ def hardness(given: str) -> str:
     named = text[-1:].isdigit() and not plain and _words(text) in _NAMES
     if named or text[:1].isalpha():
         try:
-            known = pair(text).hardness
+            pressure = pair(text).hardness
         except InputError as fault:
             kinds = (
                 "a number, a text such as '1.5 GPa', '200 HV', '200 HB', '58 HRC' or "
                 "'90 HRB', or a metal"
             )
             raise InputError(f"hardness must be {kinds}: {fault}") from None
-        if known is None:
+        if pressure is None:
             soft, hard = get(text).hardness
             raise InputError(
                 f"the hardness of {text!r} depends on its temper: write '{text} soft' "
                 f"({soft:g} GPa), '{text} hard' ({hard:g} GPa), or a hardness such as "
                 f"'{soft:g} GPa', '200 HV' or '40 HRC'"
             )
-        return known
+        return pressure
     return text
 
 
@@ -561,10 +564,10 @@ def bodies(materials: Any, E_star: Any, hardness: Any) -> tuple[Any, Any, Pair |
     """Modulus and hardness of a contact, by arguments or materials, and these materials."""
     if materials is None:
         return E_star, hardness, None
-    known = pair(materials)
+    metals = pair(materials)
     if not (isinstance(E_star, int | float) and E_star == 1.0):
         raise InputError("E_star and materials are both given: give one of them")
-    return known.E_star, known.hardness if hardness is None else hardness, known
+    return metals.E_star, metals.hardness if hardness is None else hardness, metals
 
 
 def tangential_ratio(

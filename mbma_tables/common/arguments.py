@@ -57,17 +57,17 @@ def _shortest(number: Any) -> str:
     return repr(float(number)).removesuffix(".0")
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def nearest(name: str, candidates: Iterable[str]) -> str:
     """Text that suggests the nearest known name for an unknown one."""
-    names = list(known)
+    names = list(candidates)
     alike = [other for other in names if other.lower() == name.lower()]
     near = alike or difflib.get_close_matches(name, names, 1)
     return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(names)}"
 
 
-def require_name(kind: str, name: Any, known: Iterable[str]) -> None:
+def require_name(kind: str, name: Any, candidates: Iterable[str]) -> None:
     """Reject a name that is not known, with the nearest one."""
-    names = list(known)
+    names = list(candidates)
     if name not in names:
         raise InputError(f"no {kind} is named {name!r}; {nearest(str(name), names)}")
 
@@ -100,7 +100,7 @@ def hinted(function: Callable[P, R]) -> Callable[P, R]:
     called = function.__qualname__.removesuffix(".__init__")
 
     @functools.wraps(function)
-    def checked(*given: P.args, **named: P.kwargs) -> R:
+    def checked(*arguments: P.args, **named: P.kwargs) -> R:
         for name in named:
             if name in parameters:
                 continue
@@ -109,7 +109,7 @@ def hinted(function: Callable[P, R]) -> Callable[P, R]:
             meant = SYMBOLS.get(name)
             hint = f"did you mean {meant!r}?" if meant in names else nearest(name, names)
             raise TypeError(f"{called} has no argument {name!r}: {hint}")
-        return function(*given, **named)
+        return function(*arguments, **named)
 
     return checked
 
@@ -171,10 +171,10 @@ def finite_array(name: str, value: ArrayLike) -> FloatArray:
             "out with .compressed(), or put numbers in their place with .filled(number)"
         )
     try:
-        given = np.asarray(value)
-        if given.dtype.kind not in "fiu":
-            raise TypeError(f"entries of type {given.dtype}")
-        array: FloatArray = np.asarray(given, dtype=np.float64)
+        numbers = np.asarray(value)
+        if numbers.dtype.kind not in "fiu":
+            raise TypeError(f"entries of type {numbers.dtype}")
+        array: FloatArray = np.asarray(numbers, dtype=np.float64)
     except (TypeError, ValueError) as fault:
         raise InputError(f"{name} must be real numbers: {fault}") from None
     if array.size == 0:
@@ -192,13 +192,13 @@ def spread(array: Any, shape: tuple[int, ...]) -> Any:
     return array if np.shape(array) == shape else np.broadcast_to(array, shape)
 
 
-def rows(*given: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
+def rows(*arguments: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
     """The arguments, broadcast and flat, and their shape."""
-    shape = np.broadcast(*given).shape
-    table = np.empty((len(given), *shape))
-    for k, value in enumerate(given):
+    shape = np.broadcast(*arguments).shape
+    table = np.empty((len(arguments), *shape))
+    for k, value in enumerate(arguments):
         table[k] = value
-    return table.reshape(len(given), -1), shape
+    return table.reshape(len(arguments), -1), shape
 
 
 def filled(
@@ -219,15 +219,18 @@ def filled(
 
 
 def answered(
-    fill: Callable[..., Any], given: tuple[ArrayLike, ...], outputs: int = 1, *more: Any
+    fill: Callable[..., Any],
+    arguments: tuple[ArrayLike, ...],
+    outputs: int = 1,
+    *more: Any,
 ) -> list[FloatArray]:
     """Rows computed by a loop of the core from the arguments, in their broadcast shape."""
-    columns, shape = rows(*given)
+    columns, shape = rows(*arguments)
     return list(filled(fill, columns, outputs, *more).reshape(outputs, *shape))
 
 
 def entry_by_entry(
-    function: Callable[..., Any], width: int, *given: ArrayLike
+    function: Callable[..., Any], width: int, *arguments: ArrayLike
 ) -> FloatArray:
     """Results of a function of flat arrays, computed block by block for the broadcast arguments.
 
@@ -235,7 +238,9 @@ def entry_by_entry(
     `width` numbers for each entry; entries are the last axis of its results, which must not
     depend on one another.
     """
-    columns = np.broadcast_arrays(*(np.asarray(value, dtype=float) for value in given))
+    columns = np.broadcast_arrays(
+        *(np.asarray(value, dtype=float) for value in arguments)
+    )
     flat = [column.ravel() for column in columns]
 
     def of_block(block: slice) -> FloatArray:
@@ -250,8 +255,8 @@ def entry_by_entry(
 def grouped(owner: NDArray[np.intp]) -> list[tuple[int, NDArray[np.intp]]]:
     """The distinct numbers among owners, each with its indices."""
     order = np.argsort(owner, kind="stable")
-    known, first = np.unique(owner[order], return_index=True)
-    return list(zip(known.tolist(), np.split(order, first[1:]), strict=False))
+    owners, first = np.unique(owner[order], return_index=True)
+    return list(zip(owners.tolist(), np.split(order, first[1:]), strict=False))
 
 
 def require(
@@ -283,11 +288,11 @@ def checked_hardness(hardness: ArrayLike) -> FloatArray:
     except ValueError as fault:  # rows of different lengths
         raise InputError(f"hardness must be real numbers: {fault}") from None
     infinite = np.isposinf(values) if values.dtype.kind in "fiu" else False
-    given = finite_array(
+    finite = finite_array(
         "hardness", np.where(infinite, 1.0, values) if np.any(infinite) else hardness
     )
-    require("hardness", given, given > 0, "positive, or infinite where nothing yields")
-    return np.where(infinite, np.inf, given)
+    require("hardness", finite, finite > 0, "positive, or infinite where nothing yields")
+    return np.where(infinite, np.inf, finite)
 
 
 def one_number(name: str, value: Any) -> Any:

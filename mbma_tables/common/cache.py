@@ -39,12 +39,12 @@ def folder() -> pathlib.Path | None:
     if named:
         return pathlib.Path(named)
     home = pathlib.Path.home()
-    own = {
+    standard_folders = {
         "darwin": home / "Library" / "Caches",
         "win32": pathlib.Path(os.environ.get("LOCALAPPDATA") or home),
     }
     return (
-        own.get(
+        standard_folders.get(
             sys.platform,
             pathlib.Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache"),
         )
@@ -107,10 +107,10 @@ def files() -> list[tuple[pathlib.Path, os.stat_result]]:
 
 def trim(most: int = MAX_BYTES) -> int:
     """Remove the oldest files until the rest has at most so many bytes; how many went."""
-    kept = files()
+    stored = files()
     removed = 0
-    size = sum(stat.st_size for _, stat in kept)
-    for path, stat in kept:
+    size = sum(stat.st_size for _, stat in stored)
+    for path, stat in stored:
         if size <= most:
             break
         with contextlib.suppress(OSError):

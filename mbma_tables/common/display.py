@@ -50,10 +50,12 @@ def shown(value: Any, unit: str = "1") -> str:
             if numbers.ndim == 0
             else f"{int(numbers.sum())} of {numbers.size}"
         )
-    known = numbers[~np.isnan(numbers)]
-    if not known.size:
+    numbers_not_nan = numbers[~np.isnan(numbers)]
+    if not numbers_not_nan.size:
         return "not known"
-    ends = dict.fromkeys(f"{end:.4g}" for end in (known.min(), known.max()))
+    ends = dict.fromkeys(
+        f"{end:.4g}" for end in (numbers_not_nan.min(), numbers_not_nan.max())
+    )
     return " to ".join(ends) + ("" if unit == "1" else f" {unit}")
 
 
@@ -72,14 +74,14 @@ class Displayed:
     _dims: ClassVar[tuple[str, ...] | None] = None
 
     def __init_subclass__(cls) -> None:
-        held = {
+        metadata = {
             name: each.metadata
             for name, each in vars(cls).items()
             if isinstance(each, dataclasses.Field)
         }
         lines = [
             f"{name}\n    {about['meaning']}"
-            for name, about in held.items()
+            for name, about in metadata.items()
             if "meaning" in about
         ]
         if lines and cls.__doc__:
@@ -93,10 +95,10 @@ class Displayed:
 
     def _variables(self) -> Mapping[str, Variable]:
         """Its quantities, by name."""
-        own: Any = self
-        known = {
+        instance: Any = self
+        meanings = {
             each.name: each.metadata["meaning"]
-            for each in dataclasses.fields(own)
+            for each in dataclasses.fields(instance)
             if each.metadata
         }
         return {
@@ -106,7 +108,7 @@ class Displayed:
                 re.split(r";| \[", text)[0],
                 self._dims,
             )
-            for name, text in known.items()
+            for name, text in meanings.items()
         }
 
     def _origin(self) -> Mapping[str, str]:
@@ -174,13 +176,13 @@ def dataset_of(variables: Mapping[str, Variable], facts: Mapping[str, str]) -> x
             made[name] = values.assign_attrs(described)
             continue
         rank = np.ndim(values)
-        own = (
+        dimensions = (
             dims
             if dims is not None
             else ("point",)
             if rank == 1
             else tuple(f"dim_{k}" for k in range(rank))
         )
-        made[name] = xarray.Variable(own, values, described)
+        made[name] = xarray.Variable(dimensions, values, described)
     dataset: xr.Dataset = xarray.Dataset(made, attrs=dict(facts))
     return dataset

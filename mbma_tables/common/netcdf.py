@@ -74,9 +74,13 @@ def attributes_digest(dataset: netCDF4.Dataset) -> str:
 
     The latter are their dimensions and attributes.
     """
-    own = _attributes_of(dataset)
+    attributes_of_file = _attributes_of(dataset)
     content = {
-        "": {name: value for name, value in own.items() if name != "attributes_sha256"}
+        "": {
+            name: value
+            for name, value in attributes_of_file.items()
+            if name != "attributes_sha256"
+        }
     }
     for name, variable in dataset.variables.items():
         content[name] = _attributes_of(variable) | {
@@ -134,11 +138,11 @@ def verified(
     """Attributes of an open file and of its variables, and their values, all checked."""
     # values as they are stored, for their hash
     dataset.set_auto_maskandscale(False)
-    own = _attributes_of(dataset)
+    attributes_of_file = _attributes_of(dataset)
     described = {
         name: _attributes_of(variable) for name, variable in dataset.variables.items()
     }
-    for owner, attributes in {"": own, **described}.items():
+    for owner, attributes in {"": attributes_of_file, **described}.items():
         for name, value in attributes.items():
             schema.check_attribute(owner, name, value)
     for name, variable in dataset.variables.items():
@@ -147,8 +151,10 @@ def verified(
                 f"holds variable {name}, which must hold little-endian doubles, not "
                 f"{variable.dtype}"
             )
-    missing = [name for name in required if name not in own]
-    if missing or own.get("attributes_sha256") != attributes_digest(dataset):
+    missing = [name for name in required if name not in attributes_of_file]
+    if missing or attributes_of_file.get("attributes_sha256") != attributes_digest(
+        dataset
+    ):
         raise ValueError(
             f"lacks attribute {missing[0]}"
             if missing
@@ -164,14 +170,14 @@ def verified(
         for name, variable in dataset.variables.items()
     }
     # the stored axes, not recomputed ones: another processor's logarithm may differ in the last bit
-    if digest_arrays(values) != own["values_sha256"]:
+    if digest_arrays(values) != attributes_of_file["values_sha256"]:
         raise ValueError("has values that do not match their hash")
-    return own, described, values
+    return attributes_of_file, described, values
 
 
 def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
     """The table in an open file of known kind and format."""
-    own, described, values = verified(dataset, schema.REQUIRED)
+    attributes_of_file, described, values = verified(dataset, schema.REQUIRED)
     names = [name for name, _ in schema.AXES[kind]]
     fields = ("long_name", "transform", "offset", "first", "last")
     axes = tuple(
@@ -203,7 +209,7 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
         if name.startswith(point)
     }
     return schema.TableContent(
-        kind, axes, coefficients, local_error, auxiliary, conformance, own
+        kind, axes, coefficients, local_error, auxiliary, conformance, attributes_of_file
     )
 
 
@@ -212,18 +218,18 @@ def read_table(
 ) -> schema.TableContent:
     """Open and check a table file, which must be of a `kind` where one is given."""
     with opened(path, REMEDY.format(kind or "all")) as dataset:
-        found, version = (
+        table_kind, version = (
             getattr(dataset, name, None) for name in ("mbma_kind", "format_version")
         )
-        if found not in schema.KINDS or (kind is not None and found != kind):
+        if table_kind not in schema.KINDS or (kind is not None and table_kind != kind):
             raise ValueError(
-                f"holds a table of kind {found!r}, not {kind or ' or '.join(schema.KINDS)}"
+                f"holds a table of kind {table_kind!r}, not {kind or ' or '.join(schema.KINDS)}"
             )
-        if version != schema.FORMAT_VERSIONS[found]:
+        if version != schema.FORMAT_VERSIONS[table_kind]:
             raise ValueError(
-                f"has format {version}, this library reads {schema.FORMAT_VERSIONS[found]}"
+                f"has format {version}, this library reads {schema.FORMAT_VERSIONS[table_kind]}"
             )
-        content = _content(dataset, found)
+        content = _content(dataset, table_kind)
         schema.check_content(content)
     return content
 
@@ -255,7 +261,7 @@ def write_own(
     import netCDF4
 
     arrays = {name: np.asarray(entry[1], float) for name, entry in variables.items()}
-    own = {
+    attributes_of_file = {
         "mbma_kind": OWN,
         "format_version": OWN_FORMAT,
         "values_sha256": digest_arrays(arrays),
@@ -273,7 +279,7 @@ def write_own(
                 )
                 variable.setncatts({"long_name": meaning, "units": units})
                 variable[...] = arrays[name]
-            dataset.setncatts(own)
+            dataset.setncatts(attributes_of_file)
             dataset.setncattr("attributes_sha256", attributes_digest(dataset))
 
     try:
@@ -286,15 +292,18 @@ def write_own(
 def read_own(path: os.PathLike[str] | str) -> tuple[dict[str, Any], dict[str, Any]]:
     """Values and attributes of such a file; TableFileError where damaged or edited."""
     with opened(path, OWN_REMEDY) as dataset:
-        own, _, values = verified(
+        attributes_of_file, _, values = verified(
             dataset, ("mbma_kind", "format_version", "values_sha256")
         )
-        if (own["mbma_kind"], own["format_version"]) != (OWN, OWN_FORMAT):
+        if (attributes_of_file["mbma_kind"], attributes_of_file["format_version"]) != (
+            OWN,
+            OWN_FORMAT,
+        ):
             raise ValueError(
-                f"holds a {own['mbma_kind']} of format {own['format_version']}, not a "
+                f"holds a {attributes_of_file['mbma_kind']} of format {attributes_of_file['format_version']}, not a "
                 f"{OWN} of {OWN_FORMAT}"
             )
         lost = [name for name, array in values.items() if not np.isfinite(array).all()]
         if lost:
             raise ValueError(f"has variable {lost[0]}, which is not finite")
-    return values, own
+    return values, attributes_of_file

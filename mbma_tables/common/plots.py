@@ -121,9 +121,11 @@ def draw_compression(
         ("pressure", "leakage", "leakage_scatter", pressure_label, leakage_label),
     ][: 2 + any(curve.leakage is not None for curve in curves)]
     figure = new_figure(5 * (len(panels) + len(more)), 4.5)
-    own, others = np.split(figure.subplots(1, len(panels) + len(more)), [len(panels)])
+    standard_axes, others = np.split(
+        figure.subplots(1, len(panels) + len(more)), [len(panels)]
+    )
     for axes, (x_name, y_name, scatter, x_label, y_label) in zip(
-        own, panels, strict=True
+        standard_axes, panels, strict=True
     ):
         for curve in curves:
             touches = (curve.pressure > 0) & (curve.area > 0)
@@ -161,11 +163,17 @@ def _band(axes: Axes, x: FloatArray, y: FloatArray, scatter: FloatArray | None) 
     """One standard deviation of ln y about a line, in its colour, where it is known."""
     if scatter is None or not np.isfinite(scatter).any():
         return
-    known = np.isfinite(scatter) & (y > 0)
-    factor = np.exp(np.where(known, scatter, 0.0))
+    has_scatter = np.isfinite(scatter) & (y > 0)
+    factor = np.exp(np.where(has_scatter, scatter, 0.0))
     colour = axes.lines[-1].get_color()
     axes.fill_between(
-        x, y / factor, y * factor, where=known.tolist(), alpha=0.25, color=colour, lw=0
+        x,
+        y / factor,
+        y * factor,
+        where=has_scatter.tolist(),
+        alpha=0.25,
+        color=colour,
+        lw=0,
     )
 
 

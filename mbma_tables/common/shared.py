@@ -47,8 +47,8 @@ def shared(
 
     def decorate(make: Callable[..., T]) -> "functools._lru_cache_wrapper[T]":
         @functools.wraps(make)
-        def made(*given: Any, **named: Any) -> T:
-            return frozen(make(*given, **named))
+        def made(*arguments: Any, **named: Any) -> T:
+            return frozen(make(*arguments, **named))
 
         return functools.lru_cache(maxsize)(made)
 

@@ -115,13 +115,13 @@ class Axis:
 
     def attributes(self) -> dict[str, Any]:
         """Attributes of the axis in the file."""
-        own: dict[str, Any] = {
+        entries: dict[str, Any] = {
             "long_name": self.long_name,
             "units": "1",
             "transform": self.transform,
         }
-        own |= {"offset": self.offset, "first": self.low, "last": self.high}
-        return own | {"position_formula": self.formula()}
+        entries |= {"offset": self.offset, "first": self.low, "last": self.high}
+        return entries | {"position_formula": self.formula()}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -241,9 +241,12 @@ def _check_axis(axis: Axis) -> None:
     low, high = LIMITS.get(axis.name, (-np.inf, np.inf))
     positive = axis.low + axis.offset > 0 or axis.transform == "linear"
     # lookups support an offset on the axis X only
-    known = axis.offset == 0 or axis.name == "X"
+    offset_is_supported = axis.offset == 0 or axis.name == "X"
     if not (
-        positive and known and low <= axis.low < axis.high <= high and axis.nodes > 1
+        positive
+        and offset_is_supported
+        and low <= axis.low < axis.high <= high
+        and axis.nodes > 1
     ):
         raise ValueError(
             f"has axis {axis.name} from {axis.low:g} to {axis.high:g} with offset {axis.offset:g}"

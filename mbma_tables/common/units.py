@@ -122,13 +122,13 @@ def factor(have: str, want: str, kind: str = "length", power: int = 1) -> float:
 @functools.lru_cache(1024)
 def read(name: str, text: str) -> tuple[float, str | None]:
     """A number and the unit of length or stress that a text gives it, None where it gives none."""
-    found = _NUMBER.fullmatch(text)
-    if found is None:
+    match = _NUMBER.fullmatch(text)
+    if match is None:
         raise InputError(
             f"{name} must be a number, or one with its unit, got {text[:60]!r}"
         )
-    number = float(found[1])
-    rest = found[2].strip()
+    number = float(match[1])
+    rest = match[2].strip()
     if math.isinf(number):
         raise InputError(
             f"{name} = {text[:60]!r} is above the largest number of 64 bits, 1.8e308"
@@ -185,30 +185,30 @@ class Units:
                 )
             return [self.number(name, entry) for entry in value]
         length, power = DIMENSIONS.get(name, (0, 0))
-        kind, own = ("length", self.length) if length else ("stress", self.stress)
+        kind, target_unit = ("length", self.length) if length else ("stress", self.stress)
         if not isinstance(value, str):
             # of a DataArray
             stated = getattr(value, "attrs", {}).get("units")
             if (
-                own in SIZES[kind]
+                target_unit in SIZES[kind]
                 and stated in SIZES[kind]
                 and (length or power) == 1
-                and stated != own
+                and stated != target_unit
             ):
                 raise InputError(
                     f"{name} is in {stated!r} by its attribute units, and asked for in "
-                    f"{own!r}: convert it"
+                    f"{target_unit!r}: convert it"
                 )
             return value
         number, unit = read(name, value)
         if unit is None:
             return number
-        if own == "1":
+        if target_unit == "1":
             raise InputError(
                 f"{name} = {value!r} needs a modulus, which is missing: stresses are "
                 "over E* without one"
             )
-        if own is None:
+        if target_unit is None:
             mend = (
                 "give the surface its unit"
                 if length
@@ -217,34 +217,34 @@ class Units:
             raise InputError(
                 f"{name} = {value!r} beside numbers whose unit of {kind} is not known: {mend}"
             )
-        converted = number * factor(unit, own, kind, length or power)
+        converted = number * factor(unit, target_unit, kind, length or power)
         if math.isinf(converted):
             raise InputError(
-                f"{name} = {value!r} is above the largest number of 64 bits in {own}"
+                f"{name} = {value!r} is above the largest number of 64 bits in {target_unit}"
             )
         return converted
 
-    def conductivities(self, *given: Any) -> tuple[list[Any], str]:
+    def conductivities(self, *conductivities: Any) -> tuple[list[Any], str]:
         """Conductivities and their unit over this unit of length, an SI unit for texts."""
-        if not any(isinstance(value, str) for value in given):
-            return list(given), f"conductivity/{unit_of('separation', self)}"
-        found: list[Any] = [_NUMBER.fullmatch(str(value)) for value in given]
+        if not any(isinstance(value, str) for value in conductivities):
+            return list(conductivities), f"conductivity/{unit_of('separation', self)}"
+        matches: list[Any] = [_NUMBER.fullmatch(str(value)) for value in conductivities]
         names = {
             re.sub(r"[\s()*]", "", each[2]).replace("/m/K", "/mK") if each else ""
-            for each in found
+            for each in matches
         }
         if len(names) > 1 or not names <= CONDUCTIVITIES.keys():
             allowed = "numbers, or texts in one unit such as '45 W/(m K)' or '6e7 S/m'"
             raise InputError(
-                f"conductivities are {allowed}, got {' and '.join(map(repr, given))}"
+                f"conductivities are {allowed}, got {' and '.join(map(repr, conductivities))}"
             )
         if self.length is None:
             raise InputError(
-                f"conductivity {given[0]!r} beside lengths whose unit is not known: give "
+                f"conductivity {conductivities[0]!r} beside lengths whose unit is not known: give "
                 "the surface its unit"
             )
         return [
-            float(each[1]) * factor("m", self.length) for each in found
+            float(each[1]) * factor("m", self.length) for each in matches
         ], CONDUCTIVITIES[names.pop()]
 
 
@@ -252,28 +252,30 @@ UNKNOWN = Units()
 
 
 def resolve(
-    given: Mapping[str, Any], asked: str | None = None, kind: str = "length"
+    quantities: Mapping[str, Any], requested_unit: str | None = None, kind: str = "length"
 ) -> tuple[dict[str, Any], str | None]:
     """Numbers in one unit of length or stress, and that unit: as requested, else the first."""
-    named = {name: _named(name, value, kind) for name, value in given.items()}
+    named = {name: _named(name, value, kind) for name, value in quantities.items()}
     unit = (
-        known(asked, kind)
-        if asked
+        known(requested_unit, kind)
+        if requested_unit
         else next((u for u in named.values() if u is not None), None)
     )
     if (
         unit is not None
-        and not asked
-        and any(isinstance(value, str) for value in given.values())
+        and not requested_unit
+        and any(isinstance(value, str) for value in quantities.values())
     ):
-        plain = [n for n in given if any(DIMENSIONS.get(n, ())) and named.get(n) is None]
+        plain = [
+            n for n in quantities if any(DIMENSIONS.get(n, ())) and named.get(n) is None
+        ]
         if plain:
             raise InputError(
                 f"{', '.join(plain)} without a unit beside numbers in {unit}: write the "
                 "unit to each"
             )
-    own = Units(length=unit) if kind == "length" else Units(stress=unit)
-    return {name: own.number(name, value) for name, value in given.items()}, unit
+    units = Units(length=unit) if kind == "length" else Units(stress=unit)
+    return {name: units.number(name, value) for name, value in quantities.items()}, unit
 
 
 def _entries(value: Any) -> Iterator[Any]:
@@ -303,14 +305,18 @@ def require_surface(surface: Any) -> None:
 
 
 def modulus_and_units(
-    E_star: Any, surface: Any, asked: str | None = None
+    E_star: Any, surface: Any, requested_stress: str | None = None
 ) -> tuple[Any, Units]:
     """A modulus as a number, and the units of results.
 
     Length is in the surface's unit, stress in the one requested or named by "100 GPa".
     """
     require_surface(surface)
-    stress = known(asked, "stress") if asked else _named("E_star", E_star, "stress")
+    stress = (
+        known(requested_stress, "stress")
+        if requested_stress
+        else _named("E_star", E_star, "stress")
+    )
     # without a modulus, stresses are over it
     absent = stress is None and isinstance(E_star, int | float) and E_star == 1.0
     units = Units(surface.unit, "1" if absent else stress)

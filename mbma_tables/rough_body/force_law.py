@@ -110,9 +110,9 @@ class Body:
         """
         law = self.law
         low = law.lowest if law.turning_point is None else law.turning_point
-        return (law.h_max + low) / 2, (
-            law.h_max + min(law.highest, law.h_max if self.touches else np.inf)
-        ) / 2
+        high = min(law.highest, law.h_max if self.touches else np.inf)
+        # the law's coordinate is 2 u - h_max
+        return (law.h_max + low) / 2, (law.h_max + high) / 2
 
     @property
     def touches(self) -> bool:
@@ -125,12 +125,12 @@ class Body:
         Both are zero beyond last contact; beyond the heaviest load the law is its tangent.
         """
         low, high = self.ends
-        held = np.clip(u, low, high)
-        p, k = self.law.pressure_and_stiffness(held)
+        u_of_law = np.clip(u, low, high)
+        p, k = self.law.pressure_and_stiffness(u_of_law)
         apart = u > high
-        return np.where(apart, 0.0, p + k * (held - u)) / self.law.E_star, np.where(
-            apart, 0.0, k
-        ) / self.law.E_star
+        pressure = np.where(apart, 0.0, p + k * (u_of_law - u))
+        stiffness = np.where(apart, 0.0, k)
+        return pressure / self.law.E_star, stiffness / self.law.E_star
 
     def integral(self, at: Solved, values: FloatArray) -> float:
         """Over the contact, of a cylinder per length."""
@@ -149,14 +149,14 @@ class Body:
         return np.asarray(legendre.legval(t if self.plane else 2 * t**2 - 1, series))
 
     def _newton(self, approach: float, radius: float, nodes: int) -> Solved:
-        known = plane_basis(nodes) if self.plane else basis(nodes)
-        root = known.root_weights
-        operator = radius * known.operator
+        pressures = plane_basis(nodes) if self.plane else basis(nodes)
+        root = pressures.root_weights
+        operator = radius * pressures.operator
         if self.plane:
             operator = operator + 4 / math.pi * radius * math.log(
                 self.reference / radius
             ) * np.outer(root, root)
-        rigid = known.v * radius**2 / (2 * self.radius) - approach
+        rigid = pressures.v * radius**2 / (2 * self.radius) - approach
         w = np.zeros(nodes)
         scale = abs(approach) + float(np.abs(rigid).max())
         for _ in range(STEPS):
@@ -171,23 +171,23 @@ class Body:
                 f"the half-space at the approach {approach:.6g} is not found in {STEPS} steps"
             )
         u = rigid + w / root
-        return Solved(radius, known, u, self.layer(u)[0], jacobian, math.inf)
+        return Solved(radius, pressures, u, self.layer(u)[0], jacobian, math.inf)
 
     def solved(self, approach: float, rtol: float) -> Solved:
         """The contact at an approach.
 
         The last number of nodes changes the force by a relative `rtol` at most.
         """
-        found = self._newton(
+        solution = self._newton(
             approach, math.sqrt(2 * self.radius * (approach + self.ends[1])), NODES[0]
         )
         for nodes in NODES:
             t = np.linspace(0, 1, PLACES * nodes + 1)
-            p = self.layer(self.between(found, found.u, t))[0]
+            p = self.layer(self.between(solution, solution.u, t))[0]
             edge = t[min(int(np.flatnonzero(p > EDGE * p.max())[-1]) + 1, len(t) - 1)]
-            before = self.integral(found, found.p)
-            found = self._newton(approach, found.radius * edge, nodes)
-            error = abs(before / self.integral(found, found.p) - 1)
+            before = self.integral(solution, solution.p)
+            solution = self._newton(approach, solution.radius * edge, nodes)
+            error = abs(before / self.integral(solution, solution.p) - 1)
             if error <= max(rtol, JUMPS * self.law.error):
                 break
         if not error <= max(rtol, self.law.error):
@@ -195,7 +195,7 @@ class Body:
                 f"the force at the approach {approach:.6g} is found to {error:.1g} by "
                 f"{nodes} nodes, not to {rtol:g}"
             )
-        return found._replace(error=error)
+        return solution._replace(error=error)
 
     def quantities(self, at: Solved) -> tuple[float, float, float]:
         """Force over E*, its derivative by the approach over E*, and the real area."""
@@ -238,11 +238,12 @@ class Body:
         """
         from scipy.optimize import brentq
 
-        smooth, (thin, wide) = float(self.smooth_approach(np.asarray(force))), self.ends
+        smooth = float(self.smooth_approach(np.asarray(force)))
+        thin, wide = self.ends
 
         def miss(approach: float) -> float:
-            found = self.solved(approach, RTOL)
-            return math.log(self.integral(found, found.p) / force)
+            solution = self.solved(approach, RTOL)
+            return math.log(self.integral(solution, solution.p) / force)
 
         low = smooth - wide * (1 - 1e-9)
         high = smooth - thin + 2 * FLAT * wide
@@ -264,48 +265,48 @@ def units_of(units: Units, plane: bool) -> tuple[dict[str, str], float]:
             * factor(units.stress, "Pa", "stress")
             * factor(units.length, "m", power=1 if plane else 2)
         )
-    known = {
+    unit_by_quantity = {
         "force": force,
         "stiffness": f"{force}/{length}",
         "area": length if plane else f"{length}^2",
     }
-    known |= dict.fromkeys(
+    unit_by_quantity |= dict.fromkeys(
         ("approach", "contact_radius", "position", "mean_separation"), length
     )
-    return known | {"pressure": unit_of("pressure", units)}, newtons
+    return unit_by_quantity | {"pressure": unit_of("pressure", units)}, newtons
 
 
-def forces(given: Any, body: Body, length: str | None) -> Any:
+def forces(force: Any, body: Body, length: str | None) -> Any:
     """Forces in the unit of results, of numbers and of texts such as "10 N"."""
-    if isinstance(given, list | tuple):
-        return [forces(value, body, length) for value in given]
-    if not isinstance(given, str):
-        return given
-    found = _FORCE.fullmatch(given)
+    if isinstance(force, list | tuple):
+        return [forces(value, body, length) for value in force]
+    if not isinstance(force, str):
+        return force
+    match = _FORCE.fullmatch(force)
     unit = body.units["force"]
-    if found is None or (found[3] is None) == body.plane or unit not in ("N", "N/mm"):
-        known = (
+    if match is None or (match[3] is None) == body.plane or unit not in ("N", "N/mm"):
+        requirement = (
             "the units of surface and E_star are known"
             if unit not in ("N", "N/mm")
             else "it"
         )
         raise InputError(
-            f"force must be a number or, where {known} is, like '10 {unit}', got {given!r}"
+            f"force must be a number or, where {requirement} is, like '10 {unit}', got {force!r}"
         )
     return (
-        float(found[1])
-        * NEWTONS[found[2]]
-        * (1.0 if found[3] is None else factor("mm", found[3]))
+        float(match[1])
+        * NEWTONS[match[2]]
+        * (1.0 if match[3] is None else factor("mm", match[3]))
     )
 
 
 def _of(quantity: str, meaning: str) -> Any:
-    def found(self: Any, approach: ArrayLike | str) -> Numbers:
+    def at_approach(self: Any, approach: ArrayLike | str) -> Numbers:
         value: Numbers = getattr(self.law, quantity)(self._left(approach))
         return value
 
-    found.__doc__ = meaning
-    return found
+    at_approach.__doc__ = meaning
+    return at_approach
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -350,20 +351,23 @@ class _Pressed(Theory):
     """The contacts of a body as a theory of the approach that is left up to a largest one."""
 
     def __init__(self, body: Body, top: float, rtol: float) -> None:
-        self.name, self.ends_at_h_max = body.law.theory, body.touches
-        self._body, self._top, self._rtol = body, top, rtol
+        self.name = body.law.theory
+        self.ends_at_h_max = body.touches
+        self._body = body
+        self._top = top
+        self._rtol = rtol
 
     def answer(self, surface: Any, mean_separation: FloatArray) -> TheoryAnswer:
         """Force over E*, real area and stiffness."""
         approaches = self._top - np.asarray(mean_separation, float)
-        found = [
+        solutions = [
             self._body.solved(approach, self._rtol)
             for approach in map(float, approaches.ravel())
         ]
         rows = np.array(
             [
                 (*self._body.quantities(at), at.error + self._body.law.error)
-                for at in found
+                for at in solutions
             ]
         )
         force, stiffness, area, error = (
@@ -373,8 +377,8 @@ class _Pressed(Theory):
 
     def energy(self, surface: Any, mean_separation: FloatArray) -> FloatArray:
         """Beyond the lightest load, where force is an exponential."""
-        found = self.answer(surface, mean_separation)
-        return np.asarray(found.pressure**2 / found.stiffness)
+        pressed = self.answer(surface, mean_separation)
+        return np.asarray(pressed.pressure**2 / pressed.stiffness)
 
 
 def force_law(body: Body, top: float, rtol: float) -> ForceLaw:

@@ -132,10 +132,10 @@ class RoughContact(Displayed):
 
     def _variables(self) -> dict[str, Variable]:
         loads = np.ndim(self.approach)
-        known = super()._variables()
+        variables = super()._variables()
         return {
             n: v._replace(dims=("load", "place")[1 - loads :][: np.ndim(v.values)])
-            for n, v in known.items()
+            for n, v in variables.items()
         }
 
     def _figure(self) -> Any:
@@ -240,9 +240,9 @@ def rough_contact(
     fixed = JOHNSON * R if reference is None else units.number("reference", reference)
     if not plane and reference is not None:
         raise InputError("reference is of a cylinder: leave it out")
-    own = chosen_theory(surface, theory)
+    layer_theory = chosen_theory(surface, theory)
     fixed = number_in("reference", fixed, 1e-30 * R, largest)
-    body = Body(law, R, plane, fixed, surface, own, *units_of(units, plane))
+    body = Body(law, R, plane, fixed, surface, layer_theory, *units_of(units, plane))
     if (approach is None) == (force is None):
         raise InputError("give approach or force, one of them")
     if force is None:
@@ -255,11 +255,12 @@ def rough_contact(
             f"above {apart:.6g}, below which bodies are apart",
         )
     else:
-        given = finite_array("force", forces(force, body, units.length))
-        require("force", given, given > 0, "positive")
+        positive_forces = finite_array("force", forces(force, body, units.length))
+        require("force", positive_forces, positive_forces > 0, "positive")
         scale = law.E_star * body.newtons
         wanted = np.reshape(
-            [body.approach_at(value / scale) for value in given.ravel()], given.shape
+            [body.approach_at(value / scale) for value in positive_forces.ravel()],
+            positive_forces.shape,
         )
     if wanted.ndim > 1:
         raise InputError(
@@ -276,13 +277,13 @@ def pressed(body: Body, wanted: FloatArray) -> RoughContact:
     reasons: dict[str, list[bool]] = {}
     scale = body.law.E_star * body.newtons
     for k, approach in enumerate(map(float, wanted.ravel())):
-        found = body.solved(approach, RTOL)
-        force, stiffness, area = body.quantities(found)
-        spread = rule.root_weights**2 * body.between(found, found.p, rule.v)
+        solution = body.solved(approach, RTOL)
+        force, stiffness, area = body.quantities(solution)
+        spread = rule.root_weights**2 * body.between(solution, solution.p, rule.v)
         a = float(
-            0.75 * math.pi * found.radius * np.sum(spread * rule.v) / np.sum(spread)
+            0.75 * math.pi * solution.radius * np.sum(spread * rule.v) / np.sum(spread)
         )
-        scatter, against = _trust(body, found, force)
+        scatter, against = _trust(body, solution, force)
         width = 2 * a / mean_wavelength(body.surface)
         # the mean plane below the contact: that of a cell
         scatter = math.hypot(
@@ -294,9 +295,9 @@ def pressed(body: Body, wanted: FloatArray) -> RoughContact:
         for text in against:
             reasons.setdefault(text, [False] * wanted.size)[k] = True
         t = np.linspace(0, 1, POINTS)
-        p, u = (body.between(found, values, t) for values in (found.p, found.u))
-        rows.append((scale * force, scale * stiffness, area, a, found.error, scatter))
-        profiles.append((found.radius * t, np.maximum(p, 0) * body.law.E_star, u))
+        p, u = (body.between(solution, values, t) for values in (solution.p, solution.u))
+        rows.append((scale * force, scale * stiffness, area, a, solution.error, scatter))
+        profiles.append((solution.radius * t, np.maximum(p, 0) * body.law.E_star, u))
     F, stiffness, area, a, error, scatter = (
         part.reshape(wanted.shape)[()] for part in np.array(rows).T
     )
@@ -313,33 +314,33 @@ def pressed(body: Body, wanted: FloatArray) -> RoughContact:
     )  # fmt: skip
 
 
-def _trust(body: Body, found: Solved, force: float) -> tuple[float, list[str]]:
+def _trust(body: Body, solution: Solved, force: float) -> tuple[float, list[str]]:
     """Standard deviation of ln F by that of the law, and reasons against the law.
 
     The law's deviation is alike at all places.
     """
     law = body.law
     ends = body.ends
-    u = np.clip(found.u, *ends)
+    u = np.clip(solution.u, *ends)
     bodies = Bodies(law.E_star, hardness=law.hardness)
-    known = contact(body.surface, bodies, mean_separation=u, theory=body.theory)
-    spread = np.nan_to_num(known.scatter, nan=0.0)
-    scatter = body.integral(found, found.raised(spread * found.p)) / force
-    if body.integral(found, found.p * np.isnan(known.scatter)) > COUNTED * force:
+    layer = contact(body.surface, bodies, mean_separation=u, theory=body.theory)
+    spread = np.nan_to_num(layer.scatter, nan=0.0)
+    scatter = body.integral(solution, solution.raised(spread * solution.p)) / force
+    if body.integral(solution, solution.p * np.isnan(layer.scatter)) > COUNTED * force:
         scatter = math.nan
     shares = {
-        text: body.integral(found, found.p * mask) / force
-        for text, mask in known.reasons.items()
+        text: body.integral(solution, solution.p * mask) / force
+        for text, mask in layer.reasons.items()
     }
     return scatter, [text for text, share in shares.items() if share > COUNTED]
 
 
 def mean_wavelength(surface: Any) -> float:
     """2 pi over the mean wavenumber, weighted by height variance [length]."""
-    known = getattr(surface, "q", None) is not None
+    has_spectrum = getattr(surface, "q", None) is not None
     spectrum = (
         spectrum_of(surface)
-        if known
+        if has_spectrum
         else Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1))
     )
     steep = float(surface.rms_gradient) / float(surface.h_rms) / spectrum.gradient

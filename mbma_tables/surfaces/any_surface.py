@@ -127,12 +127,12 @@ class AnySurface(Displayed, abc.ABC):
 
         Empty for a surface that was not measured.
         """
-        told = [
+        descriptions = [
             entry["told"]
             for entry in self.provenance
             if entry["step"] in ("resolution", "extrapolated")
         ]
-        return "; ".join(told)
+        return "; ".join(descriptions)
 
     @functools.cached_property
     def zeta_1(self) -> Any:
@@ -172,20 +172,20 @@ class AnySurface(Displayed, abc.ABC):
     def _facts(self) -> dict[str, str]:
         titles = {"hurst": "Hurst exponent", "rms_gradient": "rms gradient"}
         names = ("hurst", "q0", "q1", "zeta_1", "h_rms", "h_max", "rms_gradient")
-        known = {
+        numbers = {
             name: value for name in names if (value := getattr(self, name)) is not None
         }
         return {
             titles.get(name, name): shown(value, unit_of(name, Units(self.unit)))
-            for name, value in known.items()
+            for name, value in numbers.items()
         }
 
     def _variables(self) -> dict[str, Variable]:
         units = Units(self.unit)
-        known = {name: getattr(self, name) for name in MEANINGS}
+        numbers = {name: getattr(self, name) for name in MEANINGS}
         return {
             n: Variable(v, unit_of(n, units), MEANINGS[n])
-            for n, v in known.items()
+            for n, v in numbers.items()
             if v is not None
         }
 
@@ -249,12 +249,12 @@ def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
     def block(*fields: Any) -> Any:
         if whole and not all(np.size(field) for field in fields):
             # a chunk of a dask array may be empty, an array may not
-            found = (np.empty(np.broadcast_shapes(*map(np.shape, fields))),) * outputs
+            answers = (np.empty(np.broadcast_shapes(*map(np.shape, fields))),) * outputs
         else:
-            found = function(*fields)
-        return found[0] if outputs == 1 else found
+            answers = function(*fields)
+        return answers[0] if outputs == 1 else answers
 
-    found = xr.apply_ufunc(
+    answers = xr.apply_ufunc(
         block,
         *arguments,
         input_core_dims=[[]] * len(arguments),
@@ -264,15 +264,15 @@ def apply(function: Any, arguments: tuple[Any, ...], outputs: int) -> Any:
         join="exact",
         keep_attrs=False,
     )
-    return (found,) if outputs == 1 else found
+    return (answers,) if outputs == 1 else answers
 
 
 def refuse_plain(arguments: Mapping[str, Any]) -> None:
     """Reject arrays without names beside DataArrays."""
-    for name, given in arguments.items():
-        if not is_labelled(given) and np.ndim(given):
+    for name, argument in arguments.items():
+        if not is_labelled(argument) and np.ndim(argument):
             raise InputError(
-                f"beside DataArrays, {name} must be one or a scalar, got shape {np.shape(given)}"
+                f"beside DataArrays, {name} must be one or a scalar, got shape {np.shape(argument)}"
             )
 
 

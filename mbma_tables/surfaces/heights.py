@@ -218,7 +218,7 @@ def of_area(
     # two of three surfaces are between
     low = highest_point(surface.h_rms, surface.m2, area, 0.16)
     high = highest_point(surface.h_rms, surface.m2, area, 0.84)
-    told = (
+    assumption = (
         "h_max is the median over Gaussian surfaces of the nominal area; two of three are "
         "between from and to"
     )
@@ -231,6 +231,6 @@ def of_area(
         "from": low.tolist(),
         "to": high.tolist(),
         "waves_a_side": waves.tolist(),
-        "assumed": [told],
+        "assumed": [assumption],
     }
     return median[()], (*surface.provenance, record)

@@ -378,11 +378,11 @@ def _of_all_wavelengths(
 
 def _unsampled(steeper: float) -> dict[str, Any]:
     """Note on the corners of the spectrum, beyond its last ring."""
-    told = (
+    description = (
         "wavelengths that only one axis or the diagonals sample are left out of the "
         f"spectrum: with them the rms gradient would be {steeper:.2f} times as large"
     )
-    return {"step": "corners", "rms_gradient": steeper, "told": told}
+    return {"step": "corners", "rms_gradient": steeper, "told": description}
 
 
 def measured_surface(
@@ -430,7 +430,7 @@ def extrapolated(surface: S, shortest: Any, hurst: Any) -> S:
     )
     area = float(surface.rms_gradient / longer.rms_gradient)
     stiffness = float(surface.h_rms / longer.h_rms)
-    told = (
+    description = (
         f"continued to wavelengths of {wave:.4g} {surface.unit or ''}".rstrip()
         + f" by a power law with H = {exponent:g}, which was not measured: area at light "
         f"load is {area:.3g} times that of the measured wavelengths, stiffness and "
@@ -442,6 +442,6 @@ def extrapolated(surface: S, shortest: Any, hurst: Any) -> S:
         "hurst": exponent,
         "area": area,
         "stiffness": stiffness,
-        "told": told,
+        "told": description,
     }
     return dataclasses.replace(longer, provenance=(*surface.provenance, record))

@@ -221,7 +221,7 @@ def _refuse_ambiguous(rows: Sequence[Sequence[str]], name: str) -> None:
 
 def _units_of_header(content: bytes) -> list[str]:
     """Units in brackets beside the names of columns, above the numbers of a text."""
-    found: list[str] = []
+    units: list[str] = []
     # no text has zero bytes; what is no UTF-8 is the micro sign of Latin-1
     text = (
         ""
@@ -233,8 +233,8 @@ def _units_of_header(content: bytes) -> list[str]:
             break
         for name in re.findall(r"[\[(]\s*([^\W\d]+)\s*[\])]", line):
             with contextlib.suppress(InputError):
-                found.append(known(name))
-    return found
+                units.append(known(name))
+    return units
 
 
 def _channel_of(
@@ -253,25 +253,25 @@ def _channel_of(
             f"{path.name} has channels 0 to {len(channels) - 1}, not {channel}"
         )
     chosen = reader.default_channel if channel is None else channels[channel]
-    given: dict[str, Any] = {} if channel is None else {"channel_index": channel}
+    arguments: dict[str, Any] = {} if channel is None else {"channel_index": channel}
     # a plain matrix of text, whose rows are x as those of an array; that library takes its columns
     turned = (
         type(reader).__name__ == "AscReader"
         and chosen.physical_sizes is None
         and len(chosen.nb_grid_pts) == 2
     )
-    own = chosen.unit
-    if own is None and named:
+    unit_of_file = chosen.unit
+    if unit_of_file is None and named:
         *lateral, height = named
         if len(set(lateral)) > 1:
             raise InputError(
                 f"{path.name} names the units {', '.join(named)}: write x and y in one unit"
             )
-        given["unit"] = own = (lateral or named)[0]
-        if height != own:
-            given["height_scale_factor"] = factor(height, own)
-    elif own is None and unit is not None:
-        given["unit"] = unit
+        arguments["unit"] = unit_of_file = (lateral or named)[0]
+        if height != unit_of_file:
+            arguments["height_scale_factor"] = factor(height, unit_of_file)
+    elif unit_of_file is None and unit is not None:
+        arguments["unit"] = unit
     if chosen.physical_sizes is None:
         if min(chosen.nb_grid_pts) in LISTS:
             raise InputError(
@@ -281,18 +281,20 @@ def _channel_of(
             )
         if dx is None:
             raise InputError(f"{path.name} has no lengths: give the sampling step dx")
-        scale = 1.0 if own is None or unit is None else factor(unit, own)
+        scale = (
+            1.0 if unit_of_file is None or unit is None else factor(unit, unit_of_file)
+        )
         steps = [("dx", dx), ("dy", dx if dy is None else dy)][:: -1 if turned else 1]
         sides = zip(chosen.nb_grid_pts, steps, strict=False)
-        given["physical_sizes"] = tuple(
+        arguments["physical_sizes"] = tuple(
             count * scale * sampling_step(*step) for count, step in sides
         )
     elif dx is not None or dy is not None:
         raise InputError(
             f"{path.name} has its own lengths: leave dx and dy out (unit=... sets their unit)"
         )
-    found = reader.topography(**given)
-    return found.transpose() if turned else found
+    topography = reader.topography(**arguments)
+    return topography.transpose() if turned else topography
 
 
 def sampling_step(name: str, value: Any) -> float:
@@ -353,11 +355,11 @@ def grid_of(
         "physical_sizes", extent, (extent >= MIN_LENGTH) & (extent <= MAX_LENGTH), allowed
     )
     whole = getattr(source, "is_periodic", False) if periodic is None else periodic
-    found = tuple(
+    sampling = tuple(
         float(size) / max(count, 1)
         for size, count in zip(extent, np.shape(grid), strict=True)
     )
-    return grid, found, bool(whole), getattr(source, "unit", None)
+    return grid, sampling, bool(whole), getattr(source, "unit", None)
 
 
 def heights_of(grid: Any, dimensions: int = 2) -> Any:
@@ -377,8 +379,10 @@ def heights_of(grid: Any, dimensions: int = 2) -> Any:
     holes = np.ma.getmaskarray(values) | np.isnan(numbers)
     if holes.all():
         raise InputError("every height is undefined")
-    known = finite_array("heights", numbers[~holes])
-    require("heights", known, np.abs(known) <= MAX_LENGTH, "at most 1e30 in magnitude")
+    defined = finite_array("heights", numbers[~holes])
+    require(
+        "heights", defined, np.abs(defined) <= MAX_LENGTH, "at most 1e30 in magnitude"
+    )
     return np.ma.masked_array(numbers, holes)
 
 

@@ -130,7 +130,7 @@ def _accuracy(trace: _Trace, high: float) -> dict[str, Any]:
     of_height = _relative_error(trace.C[is_measured])
     of_slope = _relative_error(trace.slopes[is_measured])
     of_gradient = math.sqrt(trace.overlap) * of_slope
-    told = (
+    description = (
         f"h_rms is known to {of_height:.1%} and the rms gradient to {of_gradient:.1%} "
         "(one standard error, of a Gaussian surface)"
     )
@@ -138,7 +138,7 @@ def _accuracy(trace: _Trace, high: float) -> dict[str, Any]:
         "step": "errors",
         "h_rms": of_height,
         "rms_gradient": of_gradient,
-        "told": told,
+        "told": description,
     }
 
 
@@ -150,12 +150,12 @@ def _relative_error(powers: FloatArray) -> float:
 
 def _without_roll_off(share: float) -> dict[str, Any]:
     """Note that the longest wavelengths have a large share of the variance."""
-    told = (
+    description = (
         f"the {LONGEST} longest wavelengths of the trace hold {share:.0%} of its "
         "variance: h_rms grows with its length, its error is larger than stated, and "
         "heights are taken as Gaussian"
     )
-    return {"step": "no roll-off", "share": share, "told": told}
+    return {"step": "no roll-off", "share": share, "told": description}
 
 
 def _panel_sums(fine: FloatArray, q: FloatArray, starts: NDArray[np.intp]) -> FloatArray:
@@ -284,9 +284,9 @@ def _limits(waves: float) -> dict[str, Any]:
     summits = waves**2 / 2 / (2 * math.pi) ** 1.5
     level = math.sqrt(2 * math.log(max(summits, 2.0)))
     level = math.sqrt(2 * math.log(max(level * summits, 2.0)))
-    told = (
+    description = (
         "one trace cannot tell anisotropy: across a lay the gradient is up to sqrt(2) "
         "times too large, along it too small. Its highest point is a line's: a Gaussian "
         f"square of its length reaches about {level:.1f} h_rms"
     )
-    return {"step": "unseen", "h_max": level, "told": told, "not_valid": ONE_TRACE}
+    return {"step": "unseen", "h_max": level, "told": description, "not_valid": ONE_TRACE}

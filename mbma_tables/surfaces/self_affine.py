@@ -142,27 +142,29 @@ class SelfAffine(AnySurface):
                 units.number(name, getattr(self, name))
             # perhaps lazy: checked block by block, where numbers are computed
             return
-        given = {name: finite_array(name, getattr(self, name)) for name in PARAMETERS}
+        parameters = {
+            name: finite_array(name, getattr(self, name)) for name in PARAMETERS
+        }
         require(
             "hurst",
-            given["hurst"],
-            (given["hurst"] >= np.finfo(float).tiny) & (given["hurst"] <= 1),
+            parameters["hurst"],
+            (parameters["hurst"] >= np.finfo(float).tiny) & (parameters["hurst"] <= 1),
             "in (0, 1]",
         )
         for name in ("q0", "q1", "h_rms", "h_max"):
-            require(name, given[name], given[name] > 0, "positive")
-            sized = (given[name] >= 1 / LARGEST) & (given[name] <= LARGEST)
+            require(name, parameters[name], parameters[name] > 0, "positive")
+            sized = (parameters[name] >= 1 / LARGEST) & (parameters[name] <= LARGEST)
             require(
                 name,
-                given[name],
+                parameters[name],
                 sized,
                 f"from {1 / LARGEST:g} to {LARGEST:g}: take another unit of length",
             )
-        shape = broadcast_shape(**given)
+        shape = broadcast_shape(**parameters)
         vars(self).update(
             {
                 name: frozen(np.array(spread(array, shape)))[()]
-                for name, array in given.items()
+                for name, array in parameters.items()
             }
         )
         zeta_1 = np.asarray(self.zeta_1)
@@ -291,10 +293,10 @@ class SelfAffine(AnySurface):
         >>> ground.provenance[0]["assumed"][2]
         'h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered'
         """
-        given = {
+        roughness_parameters = {
             name: value for name, value in locals().items() if name not in ("cls", "unit")
         }
-        numbers = surface_of_roughness(unit, given)
+        numbers = surface_of_roughness(unit, roughness_parameters)
         return cls.spectral(**numbers) if "C" in numbers else cls(**numbers)
 
     @classmethod

@@ -156,15 +156,17 @@ class SpectralSurface(AnySurface):
                 positive_array("samples", self.samples), q.shape
             )
         order = np.argsort(q, kind="stable")
-        held = np.flatnonzero(C[order] > 0)
-        inside = order[held[0] : held[-1] + 1] if held.size else order[:0]
+        with_power = np.flatnonzero(C[order] > 0)
+        inside = (
+            order[with_power[0] : with_power[-1] + 1] if with_power.size else order[:0]
+        )
         vars(self).update({name: frozen(array[inside]) for name, array in keep.items()})
-        if held.size == 1:
+        if with_power.size == 1:
             raise InputError(
                 f"the spectrum has one wavenumber, {self.q[0]:.6g}: theories need a band of them, "
                 "the largest more than 3 times the smallest"
             )
-        if held.size < 2 or not self.laws.width.size:
+        if with_power.size < 2 or not self.laws.width.size:
             raise InputError(
                 "the spectrum holds no height: no two neighbours in q have positive C"
             )
@@ -281,14 +283,14 @@ class SpectralSurface(AnySurface):
         self, tested: Mapping[str, tuple[float, float]], by_map: bool = False
     ) -> tuple[str, ...]:
         """Statistics that lie outside tested ranges, and the remedy."""
-        known = {
+        statistics = {
             "skewness of heights": self.skewness,
             "kurtosis of heights": self.kurtosis,
         }
         if self.bearing is not None:
-            known["kurtosis of slopes"] = self.bearing.slope_kurtosis
+            statistics["kurtosis of slopes"] = self.bearing.slope_kurtosis
         if self.anisotropy is not None:
-            known["anisotropy"] = self.anisotropy
+            statistics["anisotropy"] = self.anisotropy
         remedy = "beyond, only 'calibrated' by a map was tested"
         if by_map and self.scans:
             remedy = (
@@ -302,9 +304,9 @@ class SpectralSurface(AnySurface):
                 cutoff = resolving(self.shortest(ROUNDED), max(self.map.steps), self.unit)
                 remedy += f" of Surface.from_map(..., {cutoff})" if cutoff else ""
         return tuple(
-            f"{name} is {known[name]:.3g}, tested from {low:g} to {high:g}: {remedy}"
+            f"{name} is {statistics[name]:.3g}, tested from {low:g} to {high:g}: {remedy}"
             for name, (low, high) in tested.items()
-            if name in known and not low <= known[name] <= high
+            if name in statistics and not low <= statistics[name] <= high
         )
 
     def power_spectrum(self, q: ArrayLike) -> Any:
@@ -324,14 +326,15 @@ class SpectralSurface(AnySurface):
 
         Lengths along the plane are `along` times as large.
         """
-        known = self.bearing
+        bearing = self.bearing
         bands = self.bands
         whole = self.map
-        if known is not None:
+        if bearing is not None:
             moved = dict.fromkeys(("h_rms", "h_max", "quantiles", "mean_height"), up)
             moved |= dict.fromkeys(("gradient", "tension_force", "tension"), up / along)
-            known = dataclasses.replace(
-                known, **{name: by * getattr(known, name) for name, by in moved.items()}
+            bearing = dataclasses.replace(
+                bearing,
+                **{name: by * getattr(bearing, name) for name, by in moved.items()},
             )
         if bands is not None:
             bands = dataclasses.replace(
@@ -343,7 +346,7 @@ class SpectralSurface(AnySurface):
         table = None if self.table is None else self.table.resized(up, along)
         scans = tuple(scan.resized(up, along) for scan in self.scans)
         parts: dict[str, Any] = {
-            "bearing": known,
+            "bearing": bearing,
             "bands": bands,
             "map": whole,
             "table": table,
@@ -388,11 +391,11 @@ class SpectralSurface(AnySurface):
         sides = np.stack([grid[:-1] * (1 + SIDE), grid[1:] * (1 - SIDE)], axis=1).ravel()
         q = np.repeat(grid, 2)[1:-1]
         C = self.laws.at(sides) + other.laws.at(sides)
-        kept = np.append(True, (np.diff(q) > 0) | (np.abs(np.diff(C)) > 1e-9 * C[1:]))
-        told = []
+        distinct = np.append(True, (np.diff(q) > 0) | (np.abs(np.diff(C)) > 1e-9 * C[1:]))
+        remarks = []
         stretch = None
         if self.bearing is not None or other.bearing is not None:
-            told.append(
+            remarks.append(
                 "curves of the maps' summits and valleys are not used: the relative "
                 "position of the maps is not known"
             )
@@ -405,7 +408,7 @@ class SpectralSurface(AnySurface):
                 sum(m2 * a / (1 + a) for m2, a in parts)
                 / sum(m2 / (1 + a) for m2, a in parts)
             )
-            told.append(
+            remarks.append(
                 f"lays are assumed to be parallel: anisotropy {stretch:.3g} at most"
             )
         record = {
@@ -413,14 +416,14 @@ class SpectralSurface(AnySurface):
             "of": [list(self.provenance), list(other.provenance)],
         }
         both = type(self)(
-            q[kept],
-            C[kept],
+            q[distinct],
+            C[distinct],
             heights=self.heights.convolved(other.heights),
             anisotropy=stretch,
             unit=self.unit,
             provenance=(
                 record
-                | ({"told": "two rough faces: " + "; ".join(told)} if told else {}),
+                | ({"told": "two rough faces: " + "; ".join(remarks)} if remarks else {}),
             ),
         )
         return both.resolved() if self.resolution or other.resolution else both
@@ -440,13 +443,13 @@ class SpectralSurface(AnySurface):
             if sampled < shortest
             else ""
         )
-        told = (
+        description = (
             "area depends on resolution: wavelengths are known down to "
             f"{shortest:.4g}{unit}{finer}, and without the last octave of them the rms "
             f"gradient would be {gradient:.2f} times as large"
         )
         if self.map is not None:
-            told += (
+            description += (
                 f"; a simulation with short_cutoff={2 * shortest:.4g} gives the area "
                 "without them"
             )
@@ -454,7 +457,7 @@ class SpectralSurface(AnySurface):
             "step": "resolution",
             "shortest": shortest,
             "gradient_without_last_octave": gradient,
-            "told": told,
+            "told": description,
         }
         return dataclasses.replace(self, provenance=(*self.provenance, record))
 

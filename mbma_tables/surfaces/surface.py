@@ -136,13 +136,19 @@ class Surface(SelfAffine):
             shown = ~np.ma.getmaskarray(np.ma.asanyarray(C))
             q = np.asarray(q)[shown]
             C = np.asarray(C)[shown]
-        known = None if heights is None else Heights.of(heights)
-        own = finite_array("C", C) * (
+        distribution = None if heights is None else Heights.of(heights)
+        C_of_paper = finite_array("C", C) * (
             1 / (4 * math.pi**2) if convention == "isotropic" else 1.0
         )
         unnamed = () if convention else ({"step": "convention", "not_valid": UNNAMED},)
         surface = MeasuredSurface(
-            q, own, h_max, known, unit=unit, provenance=unnamed, nominal_area=nominal_area
+            q,
+            C_of_paper,
+            h_max,
+            distribution,
+            unit=unit,
+            provenance=unnamed,
+            nominal_area=nominal_area,
         )
         return _modelled(surface, model, band)
 
@@ -238,10 +244,10 @@ class Surface(SelfAffine):
             raise InputError(
                 "extrapolate_to and extrapolate_hurst belong to model='measured'"
             )
-        known = measured_surface(
+        measured = measured_surface(
             prepared(heights, treatment), h_max, extrapolate_to, extrapolate_hurst
         )
-        return _modelled(MeasuredSurface.of(known), model, band)
+        return _modelled(MeasuredSurface.of(measured), model, band)
 
     @staticmethod
     def from_profile(
@@ -292,10 +298,10 @@ class Surface(SelfAffine):
         from mbma_tables.surfaces.maps import measured_surface, prepared
 
         treated = prepared(heights, treatment | {"dx": dx}, 1)
-        known = measured_surface(treated, h_max, extrapolate_to, extrapolate_hurst)
-        given = known.h_max if nominal_area is None else h_max
+        measured = measured_surface(treated, h_max, extrapolate_to, extrapolate_hurst)
+        highest = measured.h_max if nominal_area is None else h_max
         return dataclasses.replace(
-            MeasuredSurface.of(known), h_max=given, nominal_area=nominal_area
+            MeasuredSurface.of(measured), h_max=highest, nominal_area=nominal_area
         )
 
     def sampled(self) -> MeasuredSurface:
@@ -317,12 +323,12 @@ class MeasuredSurface(SpectralSurface):
     """A surface given by its isotropic spectrum; its parameters are those of `SpectralSurface`."""
 
     @classmethod
-    def of(cls, known: SpectralSurface) -> MeasuredSurface:
+    def of(cls, spectral: SpectralSurface) -> MeasuredSurface:
         """The same spectrum, with the fit of five numbers."""
         return cls(
             **{
-                field.name: getattr(known, field.name)
-                for field in dataclasses.fields(known)
+                field.name: getattr(spectral, field.name)
+                for field in dataclasses.fields(spectral)
             }
         )
 

@@ -156,9 +156,9 @@ class Treated:
         """Fourier components, under the window, that count as one independent component."""
         return 1.0 if self.periodic else OVERLAP**self.heights.ndim
 
-    def after(self, heights: Any, step: str, told: str, **numbers: Any) -> Treated:
+    def after(self, heights: Any, step: str, description: str, **numbers: Any) -> Treated:
         """The heights after a step, with its record."""
-        record = {"step": step, **numbers, "told": told}
+        record = {"step": step, **numbers, "told": description}
         return dataclasses.replace(
             self, heights=heights, provenance=(*self.provenance, record)
         )
@@ -170,7 +170,7 @@ class Treated:
         sides = " x ".join(
             f"{count * step:.4g}" for count, step in zip(shape, self.steps, strict=True)
         )
-        told = (
+        description = (
             f"{'map' if len(shape) == 2 else 'line scan'} of "
             f"{' x '.join(map(str, shape))} points, {sides}{unit}, heights read in "
             f"{self.unit or 'the same unit, which is not known'}"
@@ -180,7 +180,7 @@ class Treated:
             "points": list(shape),
             "steps": list(self.steps),
             "unit": self.unit,
-            "told": told,
+            "told": description,
         }
         edges = (
             "periodic" if self.periodic else "under a window for the spectrum"
@@ -203,6 +203,11 @@ class Treated:
         return np.asarray(values * (window / math.sqrt(np.mean(window**2))))
 
 
+def _by(shape: tuple[int, ...]) -> str:
+    """Numbers of points, such as "512 x 256"."""
+    return " x ".join(map(str, shape))
+
+
 def treat(
     grid: Any,
     steps: tuple[float, ...],
@@ -213,34 +218,33 @@ def treat(
     """Heights [length] made ready for their spectrum; NaN and masked points are undefined."""
     heights = heights_of(grid, len(steps))
     if min(heights.shape) < MIN_GRID:
-        own, least = (
-            " x ".join(map(str, shape))
-            for shape in (heights.shape, (MIN_GRID,) * heights.ndim)
-        )
+        points = _by(heights.shape)
+        least = _by((MIN_GRID,) * heights.ndim)
         raise InputError(
-            f"{own} points have too few wavelengths; needed are at least {least}"
+            f"{points} points have too few wavelengths; needed are at least {least}"
         )
-    known = Treated(heights, steps, periodic, unit)
+    treated = Treated(heights, steps, periodic, unit)
     with warnings.catch_warnings():
         # warnings of numpy inside that library are ignored
         warnings.simplefilter("ignore")
-        known = _filled(_without_outliers(known, treatment.outliers), treatment.fill)
-        known = _without_seams(known)
-        known = _within(_flattened(known, treatment.detrend), treatment)
+        treated = _filled(_without_outliers(treated, treatment.outliers), treatment.fill)
+        treated = _without_seams(treated)
+        treated = _within(_flattened(treated, treatment.detrend), treatment)
     ends = [2 * math.pi / treatment.short_cutoff] if treatment.short_cutoff else []
     ends += [last_wave(treatment.s_filter)] if treatment.s_filter else []
     longest = 2 * math.pi / (treatment.long_cutoff or math.inf)
-    return dataclasses.replace(known, waves=(longest, min(ends, default=math.inf)))
+    return dataclasses.replace(treated, waves=(longest, min(ends, default=math.inf)))
 
 
-def _flattened(known: Treated, mode: str | None) -> Treated:
+def _flattened(treated: Treated, mode: str | None) -> Treated:
     """Heights less their trend."""
-    heights = known.heights
-    trend = mode or ("mean" if known.periodic else "plane")
+    heights = treated.heights
+    trend = mode or ("mean" if treated.periodic else "plane")
     degree = DEGREES.get(trend)
     if degree is None:
         flat = np.asarray(
-            wrapped(heights, known.steps, known.periodic).detrend(trend).heights(), float
+            wrapped(heights, treated.steps, treated.periodic).detrend(trend).heights(),
+            float,
         )
     else:
         flat = without_polynomial(heights, degree)
@@ -249,7 +253,7 @@ def _flattened(known: Treated, mode: str | None) -> Treated:
         raise InputError(f"the map is flat: without its {trend} it is zero")
     before = float(np.std(heights))
     after = float(np.std(flat))
-    told = f"{trend} subtracted" + (
+    description = f"{trend} subtracted" + (
         f": h_rms {before:.4g} before, {after:.4g} after" if trend != "mean" else ""
     )
     for more, form, remedy in (
@@ -261,71 +265,75 @@ def _flattened(known: Treated, mode: str | None) -> Treated:
             else 0.0
         )
         if share > FORM:
-            told += (
+            description += (
                 f"; a {form} has {share:.0%} of the height variance: detrend={remedy!r} "
                 "removes it"
             )
             break
     removed = None if trend in ("mean", "plane") else heights - flat
-    known = known.after(
-        flat, "detrend", told, mode=trend, h_rms_before=before, h_rms_after=after
+    treated = treated.after(
+        flat, "detrend", description, mode=trend, h_rms_before=before, h_rms_after=after
     )
-    return dataclasses.replace(known, form=removed)
+    return dataclasses.replace(treated, form=removed)
 
 
 def _counted(count: int, size: int) -> str:
     return f"{count} of {size} points ({count / size:.2g} of all)"
 
 
-def _harmonic(known: Treated) -> FloatArray:
+def _harmonic(treated: Treated) -> FloatArray:
     """Heights, with undefined points filled smoothly."""
-    heights = known.heights
+    heights = treated.heights
     if np.ma.getmaskarray(heights).any():
-        scan = wrapped(heights, known.steps, known.periodic)
+        scan = wrapped(heights, treated.steps, treated.periodic)
         heights = scan.interpolate_undefined_data(method="harmonic").heights()
     return np.asarray(np.ma.getdata(heights), float)
 
 
-def _without_outliers(known: Treated, asked: float | None) -> Treated:
+def _without_outliers(treated: Treated, requested_limit: float | None) -> Treated:
     """Heights with outliers undefined; if not requested, a few outliers are only reported."""
     from scipy.ndimage import median_filter
 
-    heights = known.heights
-    whole = _harmonic(known)
+    heights = treated.heights
+    whole = _harmonic(treated)
     # far outliers distort the filling of their neighbours, not their median
-    mode = "wrap" if known.periodic else "mirror"
+    mode = "wrap" if treated.periodic else "mirror"
     median = median_filter(whole, MEDIAN_POINTS, mode=mode)
     difference = np.abs(whole - median)
     measured = ~np.ma.getmaskarray(heights)
-    isolated = measured & _isolated(whole, median, known.periodic)
+    isolated = measured & _isolated(whole, median, treated.periodic)
     # spikes on more than 1% of the points do not set the scale
     usual = measured & ~isolated
     scale = (
         float(np.quantile(difference[usual if usual.any() else measured], USUAL))
         / USUAL_DEVIATES
     )
-    limit = USUAL_LIMIT if asked is None else asked
+    limit = USUAL_LIMIT if requested_limit is None else requested_limit
     outliers = measured & (difference > limit * scale)
     out = f"out by more than {limit:g} standard deviations: "
-    if asked is not None:
+    if requested_limit is not None:
         left = np.ma.masked_array(np.ma.getdata(heights), ~measured | outliers)
         count = int(outliers.sum())
-        told = f"{_counted(count, heights.size)} stood {out}taken out"
-        return known.after(left, "outliers", told, limit=limit, points=count)
+        description = f"{_counted(count, heights.size)} stood {out}taken out"
+        return treated.after(left, "outliers", description, limit=limit, points=count)
     spikes = int((outliers & isolated).sum())
     count = int(outliers.sum())
     if spikes == 0 and not 0 < count <= FEW * heights.size:
-        return known
+        return treated
     count = count if count <= FEW * heights.size else spikes
-    told = f"{_counted(count, heights.size)} stand {out}outliers={limit:g} removes them"
+    description = (
+        f"{_counted(count, heights.size)} stand {out}outliers={limit:g} removes them"
+    )
     if spikes == 0 or heights.ndim == 1:
-        return known.after(heights, "outliers seen", told, points=count)
+        return treated.after(heights, "outliers seen", description, points=count)
     reason = (
         f"{_counted(spikes, heights.size)} are spikes, on which contact would begin: "
         f"outliers={limit:g} removes them, as in Surface.from_map(..., "
         f"outliers={limit:g})"
     )
-    return known.after(heights, "outliers seen", told, points=count, not_valid=reason)
+    return treated.after(
+        heights, "outliers seen", description, points=count, not_valid=reason
+    )
 
 
 def _isolated(values: FloatArray, median: FloatArray, periodic: bool) -> Any:
@@ -344,14 +352,14 @@ def _isolated(values: FloatArray, median: FloatArray, periodic: bool) -> Any:
     return np.abs(values - median) > ISOLATED * usual
 
 
-def _without_seams(known: Treated) -> Treated:
+def _without_seams(treated: Treated) -> Treated:
     """The same heights, with a record of a step along a whole row or column.
 
     Such a step arises where two images were joined.
     """
-    heights = np.asarray(known.heights)
+    heights = np.asarray(treated.heights)
     if heights.ndim == 1:
-        return known
+        return treated
     for axis, name in enumerate(("rows", "columns")):
         steps = np.moveaxis(np.diff(heights, axis=axis), axis, 0)
         across = np.median(steps, axis=1)
@@ -365,42 +373,42 @@ def _without_seams(known: Treated) -> Treated:
         if not seams.any():
             continue
         place = int(np.argmax(np.where(seams, size, 0.0)))
-        unit = f" {known.unit}" if known.unit else ""
-        told = (
+        unit = f" {treated.unit}" if treated.unit else ""
+        description = (
             f"the heights step by {across[place]:.4g}{unit} between {name} {place} and "
             f"{place + 1}, as where two images were joined at different levels"
         )
         parts = (":, " * axis) + f":{place + 1}", (":, " * axis) + f"{place + 1}:"
         reason = (
-            f"{told}: give each part as a map of its own, "
+            f"{description}: give each part as a map of its own, "
             f"Surface.from_map(heights[{parts[0]}], ...) and "
             f"Surface.from_map(heights[{parts[1]}], ...)"
         )
-        return known.after(
-            known.heights,
+        return treated.after(
+            treated.heights,
             "seam",
-            told,
+            description,
             between=[place, place + 1],
             axis=axis,
             not_valid=reason,
         )
-    return known
+    return treated
 
 
-def _filled(known: Treated, fill: str | None) -> Treated:
+def _filled(treated: Treated, fill: str | None) -> Treated:
     """Heights without undefined points."""
-    heights = known.heights
+    heights = treated.heights
     size = heights.size
     count = int(np.ma.getmaskarray(heights).sum())
     share = count / size
     if count == 0:
-        return dataclasses.replace(known, heights=_harmonic(known))
+        return dataclasses.replace(treated, heights=_harmonic(treated))
     if share > FREE_HOLES and fill is None:
         raise InputError(
             f"the map has {count} holes among {size} points, more than {FREE_HOLES:.0%}: "
             "fill them, smooth, with fill='harmonic', or cut them out"
         )
-    told = (
+    description = (
         f"{_counted(count, size)} were undefined and are filled harmonically: smooth "
         "there, the map lacks about as large a share of its mean squared gradient"
     )
@@ -411,10 +419,10 @@ def _filled(known: Treated, fill: str | None) -> Treated:
             "and gaps there were not measured. Cut out a part without holes, "
             "Surface.from_map(heights[i:j, k:l], ...), or measure again"
         )
-    return known.after(
-        _harmonic(known),
+    return treated.after(
+        _harmonic(treated),
         "fill",
-        told,
+        description,
         method="harmonic",
         points=count,
         share=share,
@@ -422,32 +430,36 @@ def _filled(known: Treated, fill: str | None) -> Treated:
     )
 
 
-def _within(known: Treated, treatment: Treatment) -> Treated:
+def _within(treated: Treated, treatment: Treatment) -> Treated:
     """Heights whose wavelengths lie between both cut-offs, or filters."""
     long = treatment.long_cutoff
     short = treatment.short_cutoff
-    if short is not None and not short > 2 * min(known.steps):
+    if short is not None and not short > 2 * min(treated.steps):
         raise InputError(
             "short_cutoff must be longer than two sampling steps, "
-            f"{2 * min(known.steps):.4g}, the shortest wavelength sampled, got {short:g}"
+            f"{2 * min(treated.steps):.4g}, the shortest wavelength sampled, got {short:g}"
         )
     if short is not None and long is not None and not long > short:
         raise InputError(
             f"long_cutoff must be larger than short_cutoff, got {long:g} and {short:g}"
         )
-    own = {
+    requested = {
         name: getattr(treatment, name)
         for name in CALLED
         if getattr(treatment, name) is not None
     }
-    values = known.heights if known.periodic or not own else mirrored(known.heights)
-    whole = tuple(slice(count) for count in known.heights.shape)
-    for name, wavelength in own.items():
+    values = (
+        treated.heights
+        if treated.periodic or not requested
+        else mirrored(treated.heights)
+    )
+    whole = tuple(slice(count) for count in treated.heights.shape)
+    for name, wavelength in requested.items():
         if name == "short_cutoff":
-            known = dataclasses.replace(known, uncut=values[whole])
-        before = squares(values, known.steps)
-        values = filtered(values, known.steps, name, wavelength)
-        after = squares(values, known.steps)
+            treated = dataclasses.replace(treated, uncut=values[whole])
+        before = squares(values, treated.steps)
+        values = filtered(values, treated.steps, name, wavelength)
+        after = squares(values, treated.steps)
         if not after[0] > MIN_POWER * before[0]:
             raise InputError(
                 f"{name} {wavelength:g} leaves no wavelength of the measurement"
@@ -455,23 +467,23 @@ def _within(known: Treated, treatment: Treatment) -> Treated:
         of_variance, of_gradient = (
             max(1 - b / a, 0.0) for a, b in zip(before, after, strict=True)
         )
-        length = f"{wavelength:.4g} {known.unit or ''}".rstrip()
-        told = f"{CALLED[name]} at {length} removes {of_gradient:.0%} of the squared gradient"
+        length = f"{wavelength:.4g} {treated.unit or ''}".rstrip()
+        description = f"{CALLED[name]} at {length} removes {of_gradient:.0%} of the squared gradient"
         if name in ("short_cutoff", "s_filter"):
-            told += (
+            description += (
                 f": the rms gradient is {math.sqrt(after[1] / before[1]):.2f} times that "
                 "without"
             )
-        told += f"; it removes {of_variance:.0%} of the height variance"
-        known = known.after(
+        description += f"; it removes {of_variance:.0%} of the height variance"
+        treated = treated.after(
             values,
             name,
-            told,
+            description,
             wavelength=wavelength,
             of_gradient=of_gradient,
             of_variance=of_variance,
         )
-    return dataclasses.replace(known, heights=values[whole]) if own else known
+    return dataclasses.replace(treated, heights=values[whole]) if requested else treated
 
 
 def without_polynomial(heights: FloatArray, degree: int) -> FloatArray:
