@@ -374,11 +374,14 @@ class Pair:
     @property
     def conductivities(self) -> tuple[str, str]:
         """Thermal conductivities with their unit, geometric means of the ranges."""
-        a, b = (
-            f"{math.sqrt(low * high):.6g} W/(m K)"
-            for low, high in (metal.conductivity for metal in self.metals)
-        )
-        return a, b
+        first, second = self.metals
+        return _mean_conductivity(first), _mean_conductivity(second)
+
+
+def _mean_conductivity(metal: Metal) -> str:
+    """Thermal conductivity with its unit, the geometric mean of its range."""
+    low, high = metal.conductivity
+    return f"{math.sqrt(low * high):.6g} W/(m K)"
 
 
 def pair(

@@ -45,10 +45,10 @@ def describe_entries(values: FloatArray, mask: NDArray[np.bool_]) -> str:
     if values.ndim == 0:
         return _shortest(values[()])
     places = np.argwhere(mask)
-    quoted = [
-        f"{_shortest(values[tuple(p)])} at {tuple(int(i) for i in p)}"
-        for p in places[:SHOWN]
-    ]
+    quoted = []
+    for place in places[:SHOWN]:
+        index = tuple(place.tolist())
+        quoted.append(f"{_shortest(values[index])} at {index}")
     more = len(places) - SHOWN
     return ", ".join(quoted) + (f" and {more} more" if more > 0 else "")
 

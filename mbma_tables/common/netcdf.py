@@ -184,20 +184,20 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
         schema.Axis(*(name, *map(described[name].__getitem__, fields), values[name].size))
         for name in names
     )
+    # one variable a function, of its coefficients and of their error
+    main = set(names)
+    stacked = []
     kinds = schema.COEFFICIENTS[kind], "error"
     for what, over in zip(kinds, schema.dimensions(kind), strict=True):
-        if any(
-            dataset[f"{what}_{function}"].dimensions != over
-            for function in schema.FUNCTIONS
-        ):
+        of_functions = [f"{what}_{function}" for function in schema.FUNCTIONS]
+        if any(dataset[name].dimensions != over for name in of_functions):
             raise ValueError(f"has {what} over other dimensions than {', '.join(over)}")
+        main.update(of_functions)
+        stacked.append(of_functions)
     coefficients, local_error = (
-        np.stack([values[f"{what}_{function}"] for function in schema.FUNCTIONS], axis=-1)
-        for what in kinds
+        np.stack([values[name] for name in of_functions], axis=-1)
+        for of_functions in stacked
     )
-    main = {
-        f"{what}_{function}" for what in kinds for function in schema.FUNCTIONS
-    } | set(names)
     point = "conformance_"
     beside = [name for name in values if name not in main and not name.startswith(point)]
     auxiliary = {

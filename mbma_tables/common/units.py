@@ -25,27 +25,27 @@ _LENGTHS = (
     "in=0.0254 mil=254e-7 uin=254e-10"
 )
 _STRESSES = "Pa=1 kPa=1e3 MPa=1e6 GPa=1e9 TPa=1e12 bar=1e5 atm=101325"
+
+
+def _sizes(text: str) -> dict[str, Fraction]:
+    """Sizes of units in that of the SI, from a text such as "m=1 km=1e3"."""
+    sizes = {}
+    for pair in text.split():
+        unit, size = pair.split("=")
+        sizes[unit] = Fraction(size)
+    return sizes
+
+
 SIZES: dict[str, dict[str, Fraction]] = {
-    kind: {
-        unit: Fraction(size) for unit, size in (pair.split("=") for pair in text.split())
-    }
-    for kind, text in {"length": _LENGTHS, "stress": _STRESSES}.items()
+    "length": _sizes(_LENGTHS),
+    "stress": _sizes(_STRESSES),
 }
 SIZES["stress"] |= {
     "psi": _POUND_PER_INCH,
     "ksi": 1000 * _POUND_PER_INCH,
     "Msi": 10**6 * _POUND_PER_INCH,
 }
-SIZES["force"] = {
-    unit: Fraction(size)
-    for unit, size in (
-        ("N", 1),
-        ("mN", "1e-3"),
-        ("kN", 1000),
-        ("MN", 10**6),
-        ("lbf", "4.4482216152605"),
-    )
-}
+SIZES["force"] = _sizes("N=1 mN=1e-3 kN=1e3 MN=1e6 lbf=4.4482216152605")
 ALIASES = {
     "micron": "um",
     "Å": "angstrom",
@@ -56,31 +56,30 @@ ALIASES = {
     "N/m2": "Pa",
 }
 # powers of length and of stress of named quantities
-DIMENSIONS = {
-    name: powers
-    for powers, names in {
-        (1, 0): (
-            "h_rms h_max Ra Rq Rsm Sa Sq Sp longest shortest rolloff separation "
-            "mean_separation delta R_d R_u sigma h_d overclosure separations "
-            "mean_separations deltas dx dy short_cutoff long_cutoff s_filter l_filter "
-            "extrapolate_to width displacement radius approach reference "
-            "plane_separation separation_scatter"
-        ),
-        (0, 1): (
-            "viscosity pressure_drop E_star E E1 E2 hardness elastic_hardness pressure "
-            "pressures shear mean_pressure gas_pressure"
-        ),
-        (-1, 0): "q0 q1 conductance",
-        (-2, 0): "D m4",
-        (2, 0): "m0 nominal_area island_area",
-        (-1, 1): "stiffness unloading_stiffness",
-        (3, 0): "leakage",
-        (1, 1): "energy",
-        (2, 1): "island_force",
-        (-3, 0): "island_density",
-    }.items()
-    for name in names.split()
+_NAMES_OF_POWERS = {
+    (1, 0): (
+        "h_rms h_max Ra Rq Rsm Sa Sq Sp longest shortest rolloff separation "
+        "mean_separation delta R_d R_u sigma h_d overclosure separations "
+        "mean_separations deltas dx dy short_cutoff long_cutoff s_filter l_filter "
+        "extrapolate_to width displacement radius approach reference "
+        "plane_separation separation_scatter"
+    ),
+    (0, 1): (
+        "viscosity pressure_drop E_star E E1 E2 hardness elastic_hardness pressure "
+        "pressures shear mean_pressure gas_pressure"
+    ),
+    (-1, 0): "q0 q1 conductance",
+    (-2, 0): "D m4",
+    (2, 0): "m0 nominal_area island_area",
+    (-1, 1): "stiffness unloading_stiffness",
+    (3, 0): "leakage",
+    (1, 1): "energy",
+    (2, 1): "island_force",
+    (-3, 0): "island_density",
 }
+DIMENSIONS: dict[str, tuple[int, int]] = {}
+for _powers, _names in _NAMES_OF_POWERS.items():
+    DIMENSIONS |= dict.fromkeys(_names.split(), _powers)
 CONDUCTIVITIES = {
     "W/mK": "W/(m^2 K)",
     "S/m": "S/m^2",
@@ -287,10 +286,10 @@ def _entries(value: Any) -> Iterator[Any]:
 def _named(name: str, value: Any, kind: str) -> str | None:
     """The unit named by a text, the first in a list, or the attribute of a DataArray."""
     if isinstance(value, list | tuple):
-        return next(
-            (unit for unit in (_named(name, entry, kind) for entry in value) if unit),
-            None,
-        )
+        for entry in value:
+            if unit := _named(name, entry, kind):
+                return unit
+        return None
     if isinstance(value, str):
         return read(name, value)[1]
     stated = getattr(value, "attrs", {}).get("units")

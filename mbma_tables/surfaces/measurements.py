@@ -5,6 +5,7 @@ Most formats are read by SurfaceTopography (the extra `maps`).
 
 import contextlib
 import io
+import itertools
 import os
 import pathlib
 import re
@@ -183,15 +184,20 @@ def _separated(lines: Sequence[str], name: str) -> list[list[str]]:
         rows.append(numbers[:-1] if numbers[-1] == "" else numbers)
     if separator == ",":
         _refuse_ambiguous(rows, name)
-    every = [number for row in rows for number in row]
+    every = list(itertools.chain.from_iterable(rows))
     if any("," in number for number in every):
         if points or any(number.count(",") > 1 for number in every):
             raise InputError(
                 f"{name} has commas inside numbers that also hold points, or several "
                 "commas: write decimal points, and no separators of thousands"
             )
-        rows = [[number.replace(",", ".") for number in row] for row in rows]
+        return [_with_points(row) for row in rows]
     return rows
+
+
+def _with_points(row: Sequence[str]) -> list[str]:
+    """Numbers with decimal commas as numbers with decimal points."""
+    return [number.replace(",", ".") for number in row]
 
 
 def _refuse_ambiguous(rows: Sequence[Sequence[str]], name: str) -> None:
@@ -203,8 +209,11 @@ def _refuse_ambiguous(rows: Sequence[Sequence[str]], name: str) -> None:
     """
     if any(len(row) % 2 for row in rows):
         return
-    fractions = [number for row in rows for number in row[1::2]]
-    wholes = [number for row in rows for number in row[::2]]
+    fractions: list[str] = []
+    wholes: list[str] = []
+    for row in rows:
+        fractions += row[1::2]
+        wholes += row[::2]
     if not fractions or not all(number.isdigit() for number in fractions):
         return
     widths = {len(number) for number in fractions}

@@ -6,6 +6,7 @@ Options have the names of SurfaceTopography (the extra `maps`).
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import warnings
 from collections.abc import Mapping
@@ -342,12 +343,14 @@ def _isolated(values: FloatArray, median: FloatArray, periodic: bool) -> Any:
         return np.zeros(values.shape, bool)
     wide = np.pad(values, 1, "wrap" if periodic else "reflect")
     rows, columns = values.shape
-    beside = [
-        np.abs(wide[1 + i : 1 + i + rows, 1 + j : 1 + j + columns] - median)
-        for i in (-1, 0, 1)
-        for j in (-1, 0, 1)
-        if (i, j) != (0, 0)
-    ]
+    beside = []
+    for shift in itertools.product((-1, 0, 1), repeat=2):
+        if shift != (0, 0):
+            first = 1 + shift[0]
+            left = 1 + shift[1]
+            neighbour = wide[first : first + rows, left : left + columns]
+            beside.append(np.abs(neighbour - median))
+    # the largest difference but those of neighbours that may be spikes, too
     usual = np.sort(np.stack(beside), axis=0)[-1 - OTHER_SPIKES]
     return np.abs(values - median) > ISOLATED * usual
 
