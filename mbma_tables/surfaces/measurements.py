@@ -26,7 +26,13 @@ MAX_TEXT_BYTES = 256 * 2**20
 MAX_HEADER_BYTES = 2**14
 TEXTS = (".csv", ".txt", ".asc", ".xyz")  # names of files that hold numbers as text
 CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")  # bytes that no text has
-INFINITE = re.compile(rb"(?i)(?<![a-z])inf(inity)?(?![a-z])")
+INFINITE = re.compile(rb"(?i)(?<![a-z])inf(inity|inite)?(?![a-z])")
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # of UTF-8
+# blanks that are no space: unbreakable, thin, figure and narrow ones
+BLANKS = re.compile("[\u00a0\u2007\u2009\u202f]")
+NUMBER = re.compile(r"(?<![^\s;,])[-+]?[.,]?\d[-+\d.,eE]*(?![^\s;,])")
+# formats that define heights which are not finite as undefined
+UNDEFINED_IF_INFINITE = ("DATXReader", "OPDReader")
 # in any unit: their fourth powers, as in C, neither overflow nor underflow
 MIN_LENGTH = 1e-30
 MAX_LENGTH = 1e30
@@ -82,9 +88,12 @@ def read_measurement(
                     )
                 named = _units_of_header(start)
                 stream.seek(0)
-                with module.open_topography(stream) as reader:
+                plain = _without_mark(stream)
+                with module.open_topography(plain) as reader:
                     topography = _channel_of(reader, place, dx, dy, unit, channel, named)
-                    _refuse_infinite(reader, stream, place.name)
+                    if type(reader).__name__ == "AscReader":
+                        _refuse_lost_lines(plain, topography, place.name)
+                    _refuse_infinite(reader, topography, place.name)
                     return topography
         except MbmaError:
             raise
@@ -105,22 +114,64 @@ def read_measurement(
         )
 
 
-def _refuse_infinite(reader: Any, stream: Any, name: str) -> None:
-    """Raise an error for infinite heights, which these readers take as undefined."""
-    kind = type(reader).__name__
-    infinite = False
-    if kind == "NPYReader":
-        stream.seek(0)
-        infinite = bool(np.isinf(np.load(stream, allow_pickle=False)).any())
-    elif kind == "AscReader":
-        stream.seek(0)
-        infinite = any(
-            INFINITE.search(line) for line in stream if not line.lstrip().startswith(b"#")
-        )
-    if infinite:
-        raise InputError(
-            f"{name} holds infinite heights: write NaN where a height is undefined"
-        )
+def _without_mark(stream: Any) -> Any:
+    """The same stream, or the rest of it as one where it begins with a byte-order mark.
+
+    With the mark the first number of a text is none, and its row would be lost.
+    """
+    begins = stream.read(len(BYTE_ORDER_MARK)) == BYTE_ORDER_MARK
+    if begins:
+        return io.BytesIO(stream.read())
+    stream.seek(0)
+    return stream
+
+
+def _refuse_lost_lines(stream: Any, topography: Any, name: str) -> None:
+    """Raise an error for rows of a text that its reader skips, or takes as undefined.
+
+    It skips lines in which anything is no number, as those of a header, and reads the
+    words for infinity as undefined heights.
+    """
+    stream.seek(0)
+    row = min(topography.nb_grid_pts)
+    for place, line in enumerate(stream, 1):
+        if line.lstrip().startswith(b"#"):
+            continue
+        if INFINITE.search(line):
+            raise InputError(_infinite(name))
+        words = line.split()
+        other = [word for word in words if not _is_height(word)]
+        if other and 2 * (len(words) - len(other)) >= row:
+            raise InputError(
+                f"{name}: line {place} holds {len(words) - len(other)} numbers and "
+                f"{len(other)} words that are none: write NaN where a height is undefined, "
+                "and # before lines that are no heights"
+            )
+
+
+def _is_height(word: bytes) -> bool:
+    """Whether a word of a text is a number, or says that a height is undefined."""
+    if word.lower() in (b"bad", b"nan"):
+        return True
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _refuse_infinite(reader: Any, topography: Any, name: str) -> None:
+    """Raise an error for infinite heights, which most readers take as undefined."""
+    if type(reader).__name__ in UNDEFINED_IF_INFINITE:
+        return
+    # what is masked is as it stands in the file
+    heights = np.ma.getdata(topography.heights())
+    if np.isinf(heights).any():
+        raise InputError(_infinite(name))
+
+
+def _infinite(name: str) -> str:
+    return f"{name} holds infinite heights: write NaN where a height is undefined"
 
 
 def _plain_matrix(path: pathlib.Path, why: str) -> bytes:
@@ -135,11 +186,13 @@ def _plain_matrix(path: pathlib.Path, why: str) -> bytes:
             f"{path.name} cannot be read as a map: it is no text in UTF-8"
         ) from None
     lines = [
-        line
+        BLANKS.sub(" ", line)
         for line in text.splitlines()
         if line.strip() and not line.lstrip().startswith("#")
     ]
-    rows = _separated(lines, path.name)
+    # names of columns above the numbers
+    first = next((k for k, line in enumerate(lines) if NUMBER.search(line)), 0)
+    rows = _separated(lines[first:], path.name)
     try:
         numbers = numbers_of([" ".join(row) for row in rows], None)
     except InputError as fault:
@@ -148,9 +201,7 @@ def _plain_matrix(path: pathlib.Path, why: str) -> bytes:
             f"separator between them, semicolons, tabs, blanks or commas: {fault}"
         ) from None
     if np.isinf(numbers).any():
-        raise InputError(
-            f"{path.name} holds infinite heights: write NaN where a height is undefined"
-        )
+        raise InputError(_infinite(path.name))
     content = io.BytesIO()
     np.savetxt(content, numbers)
     content.seek(0)

@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+import scipy.io
 import scipy.signal
 from helpers import random_map, refusals, topographies
 
@@ -35,6 +36,39 @@ def waves(highest=12, seed=4, shape=(POINTS, POINTS)):
 
 MAP = waves()
 LIST = np.array([(i * STEP, j * STEP, MAP[i, j]) for i in range(40) for j in range(40)])
+
+
+def write_h5(path, values):
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file["heights"] = values
+
+
+def write_nc(path, values):
+    """As any program writes it: that library marks undefined heights in a second field."""
+    import xarray as xr
+
+    x, y = (np.arange(count) for count in values.shape)
+    xr.Dataset({"heights": (("x", "y"), values)}, {"x": x, "y": y}).to_netcdf(path)
+
+
+def write_xyz(path, values):
+    x, y = np.indices(values.shape) * STEP
+    np.savetxt(path, np.column_stack([x.ravel(), y.ravel(), values.ravel()]))
+
+
+# programs that write a map in a format
+WRITERS = {
+    ".npy": np.save,
+    ".npz": np.savez,
+    ".txt": np.savetxt,
+    ".csv": lambda path, values: np.savetxt(path, values, delimiter=";"),
+    ".xyz": write_xyz,
+    ".nc": write_nc,
+    ".mat": lambda path, values: scipy.io.savemat(path, {"heights": values}),
+    ".h5": write_h5,
+}
 
 
 def treated(heights=MAP, periodic=False, steps=(STEP, STEP), **options):
@@ -317,10 +351,13 @@ class TestReading:
         assert read_measurement(tmp_path / "a.npy", dx=STEP).unit is None
 
     @pytest.mark.parametrize("suffix", [".csv", ".txt", ".asc"])
-    @pytest.mark.parametrize("separator", [";", "; ", "\t", " ", ", "])
+    @pytest.mark.parametrize(
+        "separator", [";", "; ", "\t", " ", ", ", "\u00a0", "\u202f"]
+    )
     @pytest.mark.parametrize("mark", [".", ","])
+    @pytest.mark.parametrize("start", ["", "\ufeff", "heights;in;um\n"])
     def test_every_separator_with_both_decimal_marks(
-        self, tmp_path, suffix, separator, mark
+        self, tmp_path, suffix, separator, mark, start
     ):
         values = np.round(10 * waves(shape=(40, 36)), 3)
         path = tmp_path / f"a{suffix}"
@@ -328,10 +365,20 @@ class TestReading:
             separator.join(f"{value:.3f}".replace(".", mark) for value in row)
             for row in values
         ]
-        path.write_text("\n".join(rows))
+        path.write_text(start + "\n".join(rows), encoding="utf-8")
         np.testing.assert_array_equal(
             read_measurement(path, dx=1.0, unit="um").heights(), values
         )
+
+    @pytest.mark.parametrize("row", [0, 17])
+    def test_a_row_with_a_word_is_refused(self, tmp_path, row):
+        lines = [" ".join(f"{value:.3f}" for value in line) for line in MAP]
+        lines[row] = "--- " + lines[row].split(" ", 1)[1]
+        (tmp_path / "a.txt").write_text("\n".join(lines))
+        with pytest.raises(
+            InputError, match=f"line {row + 1} holds {POINTS - 1} numbers"
+        ):
+            Surface.from_map(tmp_path / "a.txt", STEP)
 
     @pytest.mark.parametrize("digits", [1, 2, 3])
     def test_commas_that_may_be_decimal_are_refused(self, tmp_path, digits):
@@ -361,17 +408,15 @@ class TestReading:
         ):
             read_measurement(tmp_path / "a.csv", dx=1.0)
 
-    @pytest.mark.parametrize("suffix", [".npy", ".txt", ".csv"])
-    def test_infinite_heights_are_refused_as_in_an_array(self, tmp_path, suffix):
+    @pytest.mark.parametrize("suffix", WRITERS)
+    @pytest.mark.parametrize("value", [np.inf, -np.inf])
+    def test_infinite_heights_are_refused_as_in_an_array(self, tmp_path, suffix, value):
         values = MAP.copy()
-        values[3, 4] = np.inf
+        values[3, 4] = value
         path = tmp_path / f"a{suffix}"
-        if suffix == ".npy":
-            np.save(path, values)
-        else:
-            np.savetxt(path, values, delimiter=";" if suffix == ".csv" else " ")
+        WRITERS[suffix](path, values)
         with pytest.raises(InputError, match="finite"):
-            Surface.from_map(path, STEP)
+            Surface.from_map(path, None if suffix == ".xyz" else STEP)
         with pytest.raises(InputError, match="finite"):
             Surface.from_map(values, STEP)
 
