@@ -26,7 +26,7 @@ from mbma_tables.common.arguments import Numbers
 '''
 CLASSES = {
     "ContactQuantities": "Quantities of a contact; `quantity` computes them.",
-    "LawQuantities": "Quantities of a law, as functions of the mean separation, the separation or the pressure.",
+    "LawQuantities": "Quantities of a law, as functions of a gap, the pressure or the area.",
     "JointQuantities": "Quantities of a joint, as functions of the pressure.",
 }
 OF_CONTACTS = '''
@@ -48,9 +48,12 @@ LAW = """
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
 {doc}
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("{name}")
         return value
 """

@@ -67,7 +67,6 @@ if TYPE_CHECKING:
 Part = AnySurface | Mapping[str, Any]
 FACES = ("part_a", "part_b")
 EXAMPLE = '{"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}'
-LAW_RTOL = 1e-8  # of the polynomials of the joint's law
 # pressures over the hardness, and their number, in pictures
 RANGE = (1e-5, 0.3)
 POINTS = 41
@@ -314,12 +313,16 @@ class Joint(JointQuantities, Displayed):
     def at_pressure(self, pressure: ArrayLike | str) -> Contact:
         """The contact at pressures F/A0 ("10 MPa"; plain numbers in GPa), as of `contact`: each in first loading."""
         return contact_of(
-            self.surface, self.bodies, "pressure", pressure, self.theory, self.interface
+            self.surface,
+            self.bodies,
+            {"pressure": pressure},
+            self.theory,
+            self.interface,
         )
 
     def law(self) -> ContactLaw:
         """The joint's contact law, for many gaps or pressures, as of `contact_law`."""
-        return law_of(self.surface, self.bodies, self.theory, LAW_RTOL, self.interface)
+        return law_of(self.surface, self.bodies, self.theory, None, self.interface)
 
     def sensitivity(self, pressure: float | str) -> Sensitivity:
         """d ln(result)/d ln(number) at a pressure, for the numbers that the joint was described by.

@@ -184,12 +184,11 @@ def sensitivity_command(
 
     Example: mbma sensitivity --surface concrete --E-star 13.3MPa -p 100kPa
     """
-    from mbma_tables.contacts.contact import one_given
+    from mbma_tables.contacts.question import name_of_the_given
     from mbma_tables.contacts.sensitivity import sensitivity
 
-    model = model.of(
-        specimen.surface, one_given(**dict.fromkeys(options.LOADS) | loads)[0]
-    )
+    given = dict.fromkeys(options.LOADS) | loads
+    model = model.of(specimen.surface, name_of_the_given(given))
     found = sensitivity(
         specimen.surface,
         model.bodies(specimen),

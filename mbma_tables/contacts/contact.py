@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,18 +16,23 @@ from mbma_tables.common.arguments import (
     broadcast_shape,
     checked_hardness,
     describe_entries,
-    finite_array,
     hinted,
     positive_array,
     require,
     spread,
 )
-from mbma_tables.common.errors import InputError, OutOfRangeError
+from mbma_tables.common.errors import OutOfRangeError
+from mbma_tables.contacts.question import GAPS, Question, both_separations
 from mbma_tables.contacts.result import Contact, Setup
 from mbma_tables.quantities.interface import NOTHING_BETWEEN, Interface
 from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
 from mbma_tables.theories import THEORIES, default_theory, get_theory, theory_name
-from mbma_tables.theories.base import Theory, TheoryAnswer, UserTheory
+from mbma_tables.theories.base import (
+    Theory,
+    TheoryAnswer,
+    UserTheory,
+    require_domain,
+)
 from mbma_tables.theories.mbma.theory import Mbma
 
 # what a theory gives at once; the other quantities follow
@@ -109,34 +115,31 @@ def contact(
     >>> bool((at_gaps.error < 1e-8).all())
     True
     """
-    name, value = one_given(
-        separation=separation,
-        mean_separation=mean_separation,
-        pressure=pressure,
-        area=area,
-    )
-    return contact_of(surface, bodies, name, value, theory)
+    candidates = {
+        "separation": separation,
+        "mean_separation": mean_separation,
+        "pressure": pressure,
+        "area": area,
+    }
+    return contact_of(surface, bodies, candidates, theory)
 
 
 def contact_of(
     surface: AnySurface,
     bodies: Any,
-    given_name: str,
-    given_value: Any,
+    candidates: Mapping[str, Any],
     theory: str | Theory | UserTheory | None,
     interface: Interface = NOTHING_BETWEEN,
 ) -> Contact:
     """The contact at one given quantity, with what a joint has between its bodies."""
     in_units = Bodies.of(bodies).in_units(surface)
-    value = in_units.units.number(given_name, given_value)
+    question = Question.of(in_units.units, candidates)
     setup = Setup(
-        surface, in_units, chosen_theory(surface, theory, given_name), interface
+        surface, in_units, chosen_theory(surface, theory, question.name), interface
     )
-    if any_labelled(surface, value, in_units.E_star, in_units.hardness):
-        return _of_labelled(setup, given_name, value)
-    solved = _solved(
-        setup, surface, value, in_units.E_star, in_units.hardness, given_name
-    )
+    if any_labelled(surface, question.value, in_units.E_star, in_units.hardness):
+        return _of_labelled(setup, question)
+    solved = _solved(setup, surface, question, in_units.E_star, in_units.hardness)
     return Contact(setup, solved.values, solved.islands, solved.answer, solved.loaded)
 
 
@@ -152,19 +155,6 @@ def chosen_theory(
     return get_theory(name_or_theory, surface)
 
 
-def one_given(**candidates: Any) -> tuple[str, Any]:
-    """The one argument that is not None, its name first."""
-    names = []
-    for name, value in candidates.items():
-        if value is not None:
-            names.append(name)
-    if len(names) != 1:
-        raise InputError(
-            f"give exactly one of {', '.join(candidates)}; got {' and '.join(names) or 'none'}"
-        )
-    return names[0], candidates[names[0]]
-
-
 class Solved(NamedTuple):
     """A contact of plain arrays: the quantities in `ANSWERED`, and what the theory gave beside them."""
 
@@ -177,29 +167,27 @@ class Solved(NamedTuple):
 def _solved(
     setup: Setup,
     surface: AnySurface,
-    value: Any,
+    question: Question,
     E_star: Any,
     hardness: Any,
-    given_name: str,
 ) -> Solved:
     """The contact of plain arrays at a given quantity."""
-    given = finite_array(given_name, value)
     modulus = positive_array("E_star", E_star)
     cap = checked_hardness(hardness) if setup.bodies.yields else np.asarray(np.inf)
     shape = broadcast_shape(
         **{
-            given_name: given,
+            question.name: question.value,
             "surface": surface.h_rms,
             "E_star": modulus,
             "hardness": cap,
         }
     )
-    given = spread(given, shape)
+    question = Question(question.name, spread(question.value, shape))
     modulus = spread(modulus, shape)
     theory: Any = setup.theory
     if setup.bodies.yields:
         theory = theory.with_hardness(cap, modulus)
-    gaps, lighter = _separations(setup, theory, surface, given, modulus, cap, given_name)
+    gaps, lighter = _separations(setup, theory, surface, question, modulus, cap)
     if isinstance(theory, Mbma):
         totals = theory.totals(surface, gaps["separation"], modulus)
         values = {
@@ -225,36 +213,31 @@ def _separations(
     setup: Setup,
     theory: Any,
     surface: AnySurface,
-    given: FloatArray,
+    question: Question,
     modulus: FloatArray,
     cap: FloatArray,
-    given_name: str,
 ) -> tuple[dict[str, Any], Any]:
     """Both separations for the given quantity; with a hardness also `lighter` of `Yielding.loaded`."""
     h_max = np.asarray(surface.h_max)
+    name = question.name
+    gap = question.value
+    is_gap = name in GAPS
     lighter = None
-    if given_name == "separation":
+    if name == "separation":
         require(
-            given_name,
-            given,
-            given >= -h_max,
+            name,
+            gap,
+            gap >= -h_max,
             "at least -h_max, where the model ends at full compression",
         )
-        u = (h_max + given) / 2
     else:
-        require(given_name, given, given >= 0, "at least 0")
-        if given_name == "mean_separation":
-            u = given
-        else:
-            u, lighter = _inverted(
-                setup, theory, surface, given, modulus, cap, given_name
-            )
-    d = given if given_name == "separation" else 2 * u - h_max
-    if theory.ends_at_h_max:
-        # without contact, both are the distance of the mean planes
-        if given_name == "separation":
-            u = np.maximum(u, d)
-        d = np.minimum(d, u)
+        require(name, gap, gap >= 0, "at least 0")
+    if not is_gap:
+        gap, lighter = _inverted(setup, theory, surface, question, modulus, cap)
+        name = "mean_separation"
+    d, u = both_separations(name, gap, h_max, theory.ends_at_h_max)
+    if is_gap:
+        require_domain(theory, surface, name, gap, u)
     return {"separation": d[()], "mean_separation": u[()]}, lighter
 
 
@@ -262,21 +245,22 @@ def _inverted(
     setup: Setup,
     theory: Any,
     surface: AnySurface,
-    given: FloatArray,
+    question: Question,
     modulus: FloatArray,
     cap: FloatArray,
-    given_name: str,
 ) -> tuple[FloatArray, Any]:
     """Mean separations at pressures or areas."""
+    name = question.name
+    given = question.value
     with np.errstate(over="ignore"):  # what is infinite is refused as too large
-        wanted = given / modulus if given_name == "pressure" else given
+        wanted = given / modulus if name == "pressure" else given
     try:
-        if given_name == "pressure" and setup.bodies.yields:
+        if name == "pressure" and setup.bodies.yields:
             pressed: tuple[FloatArray, Any] = theory.pressed(surface, wanted)
             return pressed
-        return theory.mean_separation_at(surface, given_name, wanted), None
+        return theory.mean_separation_at(surface, name, wanted), None
     except OutOfRangeError:
-        if given_name == "pressure":
+        if name == "pressure":
             _refuse_pressure(setup, theory, surface, given, modulus, cap)
         raise
 
@@ -310,19 +294,21 @@ def _refuse_pressure(
         )
 
 
-def _of_labelled(setup: Setup, given_name: str, value: Any) -> Contact:
+def _of_labelled(setup: Setup, question: Question) -> Contact:
     """The contact of DataArrays, lazy where they are."""
     bodies = setup.bodies
 
     def solve(
         block: AnySurface, given: Any, E_star: Any, hardness: Any
     ) -> tuple[Any, ...]:
-        solved = _solved(setup, block, given, E_star, hardness, given_name)
+        solved = _solved(setup, block, question.of_block(given), E_star, hardness)
         return tuple(solved.values[name] for name in ANSWERED)
 
-    arrays = {given_name: value, "E_star": bodies.E_star, "hardness": bodies.hardness}
+    name = question.name
+    value = question.value
+    arrays = {name: value, "E_star": bodies.E_star, "hardness": bodies.hardness}
     outputs = apply_to_surface(solve, setup.surface, arrays, len(ANSWERED))
     contact = Contact(setup, dict(zip(ANSWERED, outputs, strict=True)))
     # a separation that was given keeps its name and attributes
-    contact.describe({given_name: value} if given_name.endswith("separation") else {})
+    contact.describe({name: value} if question.is_gap else {})
     return contact

@@ -15,7 +15,8 @@ from mbma_tables.bodies import Bodies
 from mbma_tables.common.arguments import FloatArray, hinted, one_number
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import DIMENSIONS, Units, factor, unit_of
-from mbma_tables.contacts.contact import chosen_theory, contact, one_given
+from mbma_tables.contacts.contact import chosen_theory, contact
+from mbma_tables.contacts.question import Question
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.maps import extrapolated
@@ -120,22 +121,23 @@ def sensitivity(
     >>> f"conductance goes like hardness^{found.slopes['hardness']['conductance']:.2f}"
     'conductance goes like hardness^-0.68'
     """
-    by, value = one_given(
-        separation=separation,
-        mean_separation=mean_separation,
-        pressure=pressure,
-        area=area,
-    )
-    chosen = chosen_theory(surface, theory, by)
     in_units = Bodies.of(bodies).in_units(surface)
+    candidates = {
+        "separation": separation,
+        "mean_separation": mean_separation,
+        "pressure": pressure,
+        "area": area,
+    }
+    question = Question.of(in_units.units, candidates)
+    chosen = chosen_theory(surface, theory, question.name)
     return relative_derivatives(
         unknowns_of(surface, chosen),
         chosen,
         in_units.units,
         moduli={"E_star": in_units.E_star},
         modulus_of=_itself,
-        by=by,
-        value=in_units.units.number(by, value),
+        by=question.name,
+        value=question.value,
         hardness=in_units.hardness,
     )
 

@@ -283,11 +283,14 @@ static bool is_name(PyObject *name, const char *text) {
     return PyUnicode_CompareWithASCIIString(name, text) == 0;
 }
 
-/* One gap or an array: the mean separation by position or by name, or the separation by name. */
+/* One gap or an array: the mean separation by position or by name, or the separation by name; a
+ * pressure or an area is left to Python. */
 static PyObject *ask_law(PyObject *self, PyObject *const *arguments, Py_ssize_t count,
                          PyObject *names, int what) {
     PyObject *mean_separation = count > 0 ? arguments[0] : Py_None;
     PyObject *separation = Py_None;
+    PyObject *pressure = Py_None;
+    PyObject *area = Py_None;
     if (count > 1)
         return PyErr_Format(PyExc_TypeError,
                             "one mean separation is taken, or separation=, got %zd arguments",
@@ -300,17 +303,22 @@ static PyObject *ask_law(PyObject *self, PyObject *const *arguments, Py_ssize_t 
             separation = value;
         else if (count == 0 && is_name(name, "mean_separation"))
             mean_separation = value;
+        else if (is_name(name, "pressure"))
+            pressure = value;
+        else if (is_name(name, "area"))
+            area = value;
         else
-            return PyErr_Format(
-                PyExc_TypeError,
-                "unexpected keyword argument %R: mean_separation or separation is taken", name);
+            return PyErr_Format(PyExc_TypeError,
+                                "unexpected keyword argument %R: mean_separation, separation, "
+                                "pressure or area is taken",
+                                name);
     }
 
     const bool by_mean = mean_separation != Py_None;
     PyObject *const gaps = by_mean ? mean_separation : separation;
     PyObject *answer = NULL;
-    if (by_mean && separation != Py_None) {
-        /* both: Python raises the error */
+    if ((by_mean && separation != Py_None) || pressure != Py_None || area != Py_None) {
+        /* of two given Python raises the error */
     } else if (PyFloat_CheckExact(gaps)) {
         const mbma_law *const law = law_of(self);
         if (law == NULL)
@@ -326,7 +334,8 @@ static PyObject *ask_law(PyObject *self, PyObject *const *arguments, Py_ssize_t 
     }
     if (answer != NULL)
         return answer;
-    return PyObject_CallMethod(self, "_ask_one", "iOO", what, mean_separation, separation);
+    return PyObject_CallMethod(self, "_ask_one", "iOOOO", what, mean_separation, separation, pressure,
+                               area);
 }
 
 #define QUANTITIES(OF) \
@@ -362,7 +371,7 @@ static PyObject *law_addresses(PyObject *self, PyObject *nothing) {
 
 #define METHOD(name, what, text) \
     {#name, (PyCFunction)(void (*)(void))law_##name, METH_FASTCALL | METH_KEYWORDS, \
-     #name "($self, mean_separation=None, *, separation=None)\n--\n\n" text},
+     #name "($self, mean_separation=None, *, separation=None, pressure=None, area=None)\n--\n\n" text},
 static PyMethodDef LAW_METHODS[] = {
     QUANTITIES(METHOD){"_addresses", law_addresses, METH_NOARGS, NULL},
     {NULL, NULL, 0, NULL},

@@ -1,4 +1,4 @@
-"""The contact that a law gives at separations or pressures, by the law's polynomials where it has them."""
+"""The contact that a law gives at one question, by the law's polynomials where it has them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.common.errors import InputError
+from mbma_tables.contacts.question import Question
 from mbma_tables.contacts.result import Contact
 
 
@@ -16,46 +16,25 @@ class LawContact(Contact):
     _law: Any
 
     @classmethod
-    def of(
-        cls, law: Any, mean_separation: Any, separation: Any, pressure: Any
-    ) -> LawContact:
-        """The contact of a law at one of the three."""
-        candidates = {
-            "mean_separation": mean_separation,
-            "separation": separation,
-            "pressure": pressure,
-        }
-        names = [name for name, value in candidates.items() if value is not None]
-        if len(names) != 1:
-            raise InputError(
-                "give the mean separation, separation= or pressure=, one of them"
-            )
-        value = law.units.number(names[0], candidates[names[0]])
-        if names[0] == "pressure":
-            d, u, area, stiffness, pressures = law.at_pressure(value)
+    def of(cls, law: Any, question: Question) -> LawContact:
+        """The contact of a law at a gap, a pressure or an area."""
+        if question.name == "pressure":
+            values = law.at_pressure(question.value)._asdict()
+        else:
+            gap = question.value
+            name = question.name
+            if not question.is_gap:
+                gap = law.separation(area=gap)
+                name = "separation"
+            d, u = law.both_separations(name, gap)
+            pressure, area, stiffness, _ = law.values(**{name: gap})
             values = {
                 "separation": d,
                 "mean_separation": u,
                 "area": area,
                 "stiffness": stiffness,
+                "pressure": pressure,
             }
-            return cls._made(law, values | {"pressure": pressures})
-        u = value if names[0] == "mean_separation" else (law.h_max + value) / 2
-        d = value if names[0] == "separation" else 2 * value - law.h_max
-        pressures, area, stiffness, energy = law.values(separation=d)
-        values = {
-            "separation": d,
-            "mean_separation": u,
-            "area": area,
-            "stiffness": stiffness,
-        }
-        values |= {"pressure": pressures}
-        if law.elastic is None:
-            values["energy"] = energy
-        return cls._made(law, values)
-
-    @classmethod
-    def _made(cls, law: Any, values: dict[str, Any]) -> LawContact:
         values["error"] = law.error + 0.0 * values["area"]
         contact = cls(law.setup, values)
         contact.describe({})
@@ -63,10 +42,10 @@ class LawContact(Contact):
         return contact
 
     def quantity(self, name: str) -> Any:
-        """A quantity by its name; the unloading stiffness is the law's."""
-        if name == "unloading_stiffness" and name not in self._values:
-            stiffness = self._law.unloading_stiffness(separation=self.separation)
-            self._values[name] = self._described(name, stiffness)
+        """A quantity by its name; energy and unloading stiffness are the law's."""
+        if name in ("energy", "unloading_stiffness") and name not in self._values:
+            value = getattr(self._law, name)(separation=self.separation)
+            self._values[name] = self._described(name, value)
         return super().quantity(name)
 
     def pressure_at(self, mean_separation: Any) -> Any:

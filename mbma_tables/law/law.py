@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import (
     FloatArray,
     Numbers,
-    finite_array,
     is_labelled,
     require,
 )
@@ -26,6 +25,7 @@ from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
 from mbma_tables.common.shared import frozen
 from mbma_tables.common.units import Units, unit_of
+from mbma_tables.contacts.question import Question, both_separations
 from mbma_tables.contacts.result import Setup
 from mbma_tables.core import core
 from mbma_tables.law import block as at
@@ -33,6 +33,7 @@ from mbma_tables.law.block import AREA, FORCE, QUANTITIES, inverse_block
 from mbma_tables.law.continued import ContinuedLaw
 from mbma_tables.quantities import registry
 from mbma_tables.quantities.properties import LawQuantities
+from mbma_tables.quantities.stiffnesses import ENERGY_OF_YIELDED
 from mbma_tables.surfaces.any_surface import AnySurface, apply
 
 if TYPE_CHECKING:
@@ -96,8 +97,9 @@ LawValues = collections.namedtuple(
 class ContactLaw(Law, LawQuantities, Displayed):
     """Pressure and area of one surface against its gap; made by `contact_law`, picklable, tens of kB with its surface.
 
-    Every method takes the mean separation u, or ``separation=``, MBMA's d: numbers in the
-    law's unit of length, or texts with their own, "0.8 um".
+    Every method takes the mean separation u by position, or ``separation=``, MBMA's d,
+    ``pressure=`` or ``area=``: numbers in the law's units, texts with their own, "0.8 um",
+    lists and arrays of them, or DataArrays.
 
     Examples
     --------
@@ -176,33 +178,51 @@ class ContactLaw(Law, LawQuantities, Displayed):
         """Centre, rate, polynomials of force and area, and energy of each piece, shape (records, RECORD)."""
         return self.block[self.block.view(np.int64)[at.RECORDS] :].reshape(-1, at.RECORD)
 
-    def separations(
-        self, mean_separation: Any = None, separation: Any = None
-    ) -> FloatArray:
-        """Separations d, checked, from either mean separations or separations."""
-        return self._in_range(*self._known(mean_separation, separation))[1]
+    def _asked(
+        self,
+        mean_separation: Any = None,
+        separation: Any = None,
+        pressure: Any = None,
+        area: Any = None,
+    ) -> Question:
+        """The one that is given, in the units of the law."""
+        candidates = {
+            "separation": separation,
+            "mean_separation": mean_separation,
+            "pressure": pressure,
+            "area": area,
+        }
+        return Question.of(self.units, candidates)
 
-    def _known(self, mean_separation: Any, separation: Any) -> tuple[str, Any]:
-        """The one that is given, and its name."""
-        if (mean_separation is None) == (separation is None):
-            raise InputError("give the mean separation, or separation=, one of them")
-        return (
-            ("mean_separation", mean_separation)
-            if separation is None
-            else ("separation", separation)
-        )
+    def both_separations(self, name: str, gap: Any) -> tuple[Any, Any]:
+        """Separations d and mean separations u, of which `gap` is the one named."""
+        return both_separations(name, gap, self.h_max, math.isinf(self.highest))
 
-    def _in_range(self, name: str, given: Any) -> tuple[FloatArray, FloatArray]:
-        """Gaps as they were given, and as separations d, within the law."""
-        gaps = finite_array(name, self.units.number(name, given))
+    def _separations(self, question: Question) -> Any:
+        """Separations d within the law, at gaps, pressures or areas."""
+        if not question.is_gap:
+            return self._inverse(question)[0]
+        if is_labelled(question.value):
+            return apply(
+                lambda block: (self._separations(question.of_block(block)),),
+                (question.value,),
+                1,
+            )[0]
+        return self._in_range(question)
+
+    def _in_range(self, question: Question) -> FloatArray:
+        """Gaps as separations d; an error for those beyond the law."""
+        name = question.name
+        gaps = question.value
+        d: FloatArray = self.both_separations(name, gaps)[0]
         mean = name == "mean_separation"
-        d = 2 * gaps - self.h_max if mean else gaps
-        least = self.lowest
-        most = self.highest
+        theory = self.setup.theory
+        # where islands of MBMA are not covered, NaN may be asked for
+        least = -self.h_max if theory.outside == "nan" else self.lowest
         # ends that are no round numbers are met but for rounding
         slack = 0.0 if least == -self.h_max else ROUNDING * self.h_max
         shown_least, shown_most = (
-            (end + self.h_max) / 2 if mean else end for end in (least, most)
+            (end + self.h_max) / 2 if mean else end for end in (least, self.highest)
         )
         limit = "" if slack or mean else "-h_max = "
         require(
@@ -211,151 +231,189 @@ class ContactLaw(Law, LawQuantities, Displayed):
             d >= least - slack,
             f"at least {limit}{shown_least:.17g}, where the theory ends",
         )
-        if most < math.inf:
+        if self.highest < math.inf:
             require(
                 name,
                 gaps,
-                d <= most * (1 + ROUNDING),
+                d <= self.highest * (1 + ROUNDING),
                 f"at most {shown_most:.17g}, where the law ends",
             )
-        return gaps, d
+        return d
 
-    def _ask(
-        self,
-        given: Any,
-        count: int,
-        check: Callable[[Any], FloatArray],
-        fill: Callable[..., bool],
-    ) -> Any:
-        """Result of `fill`, in blocks, if it reports that all is in range; else `check` raises."""
-        if is_labelled(given):
-            return apply(
-                lambda block: self._ask(block, count, check, fill), (given,), count
-            )
-        # entries of plain arrays are checked during evaluation
-        plain = type(given) is np.ndarray and given.dtype == np.float64 and given.size > 0
-        known = given if plain else check(given)
-        flat = np.ascontiguousarray(known).reshape(-1)
-        out = np.empty((count, flat.size))
-        if not all(
-            in_blocks(lambda block: fill(flat[block], *out[:, block]), flat.size, BLOCK)
-        ):
-            check(given)
-        return tuple(values.reshape(known.shape)[()] for values in out)
-
-    def _values(
-        self, wanted: tuple[str, ...], mean_separation: Any, separation: Any
-    ) -> Any:
+    def _values(self, wanted: tuple[str, ...], question: Question) -> Any:
         """The quantities wanted, in the order of `QUANTITIES`, in one pass."""
-        name, given = self._known(mean_separation, separation)
+        if is_labelled(question.value):
+            return apply(
+                lambda block: self._values(wanted, question.of_block(block)),
+                (question.value,),
+                len(wanted),
+            )
+        if question.name == "mean_separation":
+            # bodies so far apart that this is infinite are answered below
+            with np.errstate(over="ignore"):
+                d = 2 * question.value - self.h_max
+        else:
+            d = self._separations(question) if not question.is_gap else question.value
+        values, inside = self._filled(wanted, d)
+        if question.is_gap and not inside:
+            values, _ = self._filled(wanted, self._in_range(question))
+        return values
 
-        def fill(gaps: FloatArray, *out: FloatArray) -> bool:
-            found = dict(zip(wanted, out, strict=True))
-            d = gaps if name == "separation" else 2 * gaps - self.h_max
-            return not core.law_fill(d, self.block, *map(found.get, QUANTITIES))
+    def _filled(
+        self, wanted: tuple[str, ...], d: FloatArray
+    ) -> tuple[tuple[Numbers, ...], bool]:
+        """The quantities wanted at separations d, and whether all of these are within the law."""
+        flat = np.ascontiguousarray(d).reshape(-1)
+        out = np.empty((len(wanted), flat.size))
+        rows = dict(zip(wanted, out, strict=True))
+        by_quantity = [rows.get(name) for name in QUANTITIES]
 
-        return self._ask(
-            given, len(wanted), lambda given: self._in_range(name, given)[0], fill
-        )
+        def fill(block: slice) -> bool:
+            parts = (None if row is None else row[block] for row in by_quantity)
+            return not core.law_fill(flat[block], self.block, *parts)
 
-    def _ask_one(self, what: int, mean_separation: Any, separation: Any) -> Any:
+        inside = all(in_blocks(fill, flat.size, BLOCK))
+        return tuple(values.reshape(np.shape(d))[()] for values in out), inside
+
+    def _ask_one(
+        self, what: int, mean_separation: Any, separation: Any, pressure: Any, area: Any
+    ) -> Any:
         """Arguments that a method of `Law` does not evaluate itself."""
-        return self._values((QUANTITIES[what],), mean_separation, separation)[0]
+        question = self._asked(mean_separation, separation, pressure, area)
+        return self._values((QUANTITIES[what],), question)[0]
+
+    def energy(self, *gaps: Any, **named: Any) -> Numbers:
+        """Elastic energy per nominal area, the integral of F/A0 over u to last contact.
+
+        Arguments are those of `pressure`.
+
+        Raises
+        ------
+        InputError
+            With a hardness, as of `contact`.
+        """
+        self._require_elastic_energy()
+        return super().energy(*gaps, **named)
+
+    def _require_elastic_energy(self) -> None:
+        if self.elastic is not None:
+            raise InputError(ENERGY_OF_YIELDED)
 
     def pressure_and_stiffness(
         self,
-        mean_separation: ArrayLike | None = None,
+        mean_separation: ArrayLike | str | None = None,
         *,
-        separation: ArrayLike | None = None,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> tuple[Numbers, Numbers]:
         """F/A0 and -dp/du in one pass, for iterations."""
-        pressure, stiffness = self._values(
-            ("pressure", "stiffness"), mean_separation, separation
-        )
-        return pressure, stiffness
+        question = self._asked(mean_separation, separation, pressure, area)
+        pressures, stiffness = self._values(("pressure", "stiffness"), question)
+        return pressures, stiffness
 
     def values(
         self,
-        mean_separation: ArrayLike | None = None,
+        mean_separation: ArrayLike | str | None = None,
         *,
-        separation: ArrayLike | None = None,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> LawValues:
-        """Pressure, area, stiffness -dp/du and energy in one pass."""
+        """Pressure, area, stiffness -dp/du and the integral of the pressure over u, in one pass.
+
+        That integral is the elastic energy where nothing yields.
+        """
+        question = self._asked(mean_separation, separation, pressure, area)
         return LawValues(
-            *self._values(
-                ("pressure", "area", "stiffness", "energy"), mean_separation, separation
-            )
+            *self._values(("pressure", "area", "stiffness", "energy"), question)
         )
 
     def separation(
-        self, *, pressure: ArrayLike | None = None, area: ArrayLike | None = None
+        self,
+        mean_separation: ArrayLike | str | None = None,
+        *,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
-        """Separation d at a pressure or area, on the branch of first contact; h_max at zero, if contact ends there.
+        """Separation d at a mean separation, or at a pressure or area on the branch of first contact.
+
+        It is h_max where these are zero, if contact ends there.
 
         Raises
         ------
         OutOfRangeError
             If the branch does not reach the value; the message has the branch's end.
         """
-        if (pressure is None) == (area is None):
-            raise InputError("give pressure or area, one of them")
-        name, given = (
-            ("area", area)
-            if pressure is None
-            else ("pressure", self.units.number("pressure", pressure))
-        )
-        return self._inverse(name, given)[0]  # type: ignore[no-any-return]
+        question = self._asked(mean_separation, separation, pressure, area)
+        d: Numbers = self._separations(question)
+        return d
 
-    def at_pressure(self, pressure: ArrayLike) -> LawPoint:
-        """Separations, area and stiffness -dF/du where F/A0 is `pressure`, on the branch of first contact."""
-        pressure = self.units.number("pressure", pressure)
-        d, area, stiffness = self._inverse("pressure", pressure, 3)
+    def at_pressure(self, pressure: ArrayLike | str) -> LawPoint:
+        """Separations, area and stiffness -dF/du where F/A0 is `pressure`, on the branch of first contact.
+
+        With a hardness each of several pressures is reached by first loading from no contact,
+        also where they fall: a law does not know of a larger pressure before.
+        """
+        question = self._asked(pressure=pressure)
+        d, area, stiffness = self._inverse(question, 3)
         mean = d + self.h_max
         mean *= 0.5
-        given = pressure if is_labelled(pressure) else np.asarray(pressure, float)[()]
-        point = LawPoint(d, mean, area, stiffness, given)
+        point = LawPoint(d, mean, area, stiffness, question.value[()])
         point.units = self.units
         return point
 
-    def _inverse(self, name: str, given: Any, count: int = 1) -> Any:
+    def _inverse(self, question: Question, count: int = 1) -> Any:
         """Gaps of pressures or areas, and with a `count` of 3 area and -dF/du there."""
-        which = FORCE if name == "pressure" else AREA
-        inverse = self._inverse_block(name)
+        wanted = question.value
+        if is_labelled(wanted):
+            return apply(
+                lambda block: self._inverse(question.of_block(block), count),
+                (wanted,),
+                count,
+            )
+        which = FORCE if question.name == "pressure" else AREA
+        inverse = self._inverse_block(question.name)
+        flat = np.ascontiguousarray(wanted).reshape(-1)
+        out = np.empty((count, flat.size))
+
+        def fill(block: slice) -> bool:
+            gap, *also = out[:, block]
+            return not core.law_invert(
+                flat[block], self.block, inverse, which, gap, *(also or (None, None))
+            )
+
+        if not all(in_blocks(fill, flat.size, BLOCK)):
+            self._require_on_branch(question, inverse)
+        return tuple(values.reshape(wanted.shape)[()] for values in out)
+
+    def _require_on_branch(self, question: Question, inverse: FloatArray) -> None:
+        """Reject pressures or areas that the branch of first contact does not reach."""
+        name = question.name
+        wanted = question.value
         least = inverse[at.Y_LEAST]
         most = inverse[at.Y_HIGH]
         end = inverse[at.END]
-
-        def check(given: Any) -> FloatArray:
-            wanted = finite_array(name, given)
-            if ((wanted >= max(least, 0.0)) & (wanted <= most)).all():
-                return wanted
-            known = self.units.length, self.units.stress if name == "pressure" else None
-            length, unit = ("" if own in (None, "1") else f" {own}" for own in known)
-            low = f"at least {least:.6g}{unit}"
-            high = f"at most {most:.6g}{unit}"
-            require(name, wanted, wanted >= 0, "at least 0")
-            require(
-                name,
-                wanted,
-                wanted >= least,
-                f"{low}, where the law of {self.theory!r} ends",
-                unit,
-            )
-            require(
-                name,
-                wanted,
-                wanted <= most,
-                f"{high}, at d = {end:.6g}{length} where the branch ends",
-                unit,
-            )
-            return wanted
-
-        def fill(wanted: FloatArray, gap: FloatArray, *also: FloatArray) -> bool:
-            return not core.law_invert(
-                wanted, self.block, inverse, which, gap, *(also or (None, None))
-            )
-
-        return self._ask(given, count, check, fill)
+        units = self.units.length, self.units.stress if name == "pressure" else None
+        length, unit = ("" if one in (None, "1") else f" {one}" for one in units)
+        low = f"at least {least:.6g}{unit}"
+        high = f"at most {most:.6g}{unit}"
+        require(name, wanted, wanted >= 0, "at least 0")
+        require(
+            name,
+            wanted,
+            wanted >= least,
+            f"{low}, where the law of {self.theory!r} ends",
+            unit,
+        )
+        require(
+            name,
+            wanted,
+            wanted <= most,
+            f"{high}, at d = {end:.6g}{length} where the branch ends",
+            unit,
+        )
 
     def _inverse_block(self, name: str) -> FloatArray:
         """Polynomials of x over force or area, made when first needed."""
@@ -372,9 +430,11 @@ class ContactLaw(Law, LawQuantities, Displayed):
 
     def slope_error(
         self,
-        mean_separation: ArrayLike | None = None,
+        mean_separation: ArrayLike | str | None = None,
         *,
-        separation: ArrayLike | None = None,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Any:
         """Bound on the error of `stiffness` over 2F/l, and of `area_slope` over A/l, against those of the theory.
 
@@ -382,7 +442,8 @@ class ContactLaw(Law, LawQuantities, Displayed):
         polynomials, and for MBMA that of the islands as it propagates to slopes; not the
         error of another theory itself.
         """
-        d = self.separations(mean_separation, separation)
+        question = self._asked(mean_separation, separation, pressure, area)
+        d = np.asarray(self._separations(question))
         head = self.block
         words = self.block.view(np.int64)
         x = (self.h_max + np.where(d < 0, head[at.MINUS], head[at.PLUS]) * d) * head[
@@ -436,9 +497,10 @@ class ContactLaw(Law, LawQuantities, Displayed):
         d = np.maximum(
             ends[0] + (ends[1] - ends[0]) * np.concatenate([light, deep]), ends[1]
         )
-        values = {"separation": d, "mean_separation": (d + self.h_max) / 2} | self.values(
-            separation=d
-        )._asdict()
+        values = {"separation": d, "mean_separation": (d + self.h_max) / 2}
+        values |= self.values(separation=d)._asdict()
+        if self.elastic is not None:
+            del values["energy"]
         return {
             name: Variable(value, unit_of(name, self.units), registry.get(name).meaning)
             for name, value in values.items()
@@ -473,6 +535,8 @@ class ContactLaw(Law, LawQuantities, Displayed):
 
         if quantity not in QUANTITIES:
             raise InputError(f"quantity must be one of {QUANTITIES}, got {quantity!r}")
+        if quantity == "energy":
+            self._require_elastic_energy()
         addresses, data = self._addresses()
         function = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_void_p)
         given = ctypes.c_void_p(data)
@@ -491,19 +555,23 @@ class ContactLaw(Law, LawQuantities, Displayed):
 
     def unloading_stiffness(
         self,
-        mean_separation: ArrayLike | None = None,
+        mean_separation: ArrayLike | str | None = None,
         *,
-        separation: ArrayLike | None = None,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """-dp/du of a small unloading at constant contact area [stress/length]; `stiffness` where nothing yields.
 
         With a hardness it is made from the law of the elastic contact, which is fitted when
         this is first called.
         """
+        question = self._asked(mean_separation, separation, pressure, area)
         law, factor = self.unloading()
-        stiffness: Numbers = factor * law.stiffness(
-            mean_separation, separation=separation
-        )
+        # the law of the elastic contact has other pressures at this gap
+        d = question.value if question.is_gap else self._separations(question)
+        name = question.name if question.is_gap else "separation"
+        stiffness: Numbers = factor * law._values(("stiffness",), Question(name, d))[0]
         return stiffness
 
     def unloading(self) -> tuple[ContactLaw, float]:
@@ -528,22 +596,29 @@ class ContactLaw(Law, LawQuantities, Displayed):
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> LawContact:
-        """The contact at mean separations, separations or pressures, with every quantity, as of `contact`."""
+        """The contact at gaps, pressures or areas, with every quantity, as of `contact`."""
         from mbma_tables.law.contact_of_law import LawContact
 
-        return LawContact.of(self, mean_separation, separation, pressure)
+        question = self._asked(mean_separation, separation, pressure, area)
+        return LawContact.of(self, question)
 
     def tangential(
         self,
         mean_separation: ArrayLike | str | None = None,
         *,
+        separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
         friction: float | None = None,
         direction: str | None = None,
     ) -> Tangential:
-        """Tangential stiffness and slip at a mean separation or a pressure, as `Contact.tangential`."""
-        return self.at(mean_separation, pressure=pressure).tangential(friction, direction)
+        """Tangential stiffness and slip at a gap, a pressure or an area, as `Contact.tangential`."""
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
+        return contact.tangential(friction, direction)
 
     def continued(self, pressures: tuple[Any, Any] | None = None) -> ContinuedLaw:
         """The law continued by its tangents beyond two pressures, for the trial steps of Newton's method.

@@ -56,30 +56,28 @@ class LeakageLaw:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
-        """Flow coefficient at mean separations, separations or pressures; exactly 0 where blocked.
+        """Flow coefficient at gaps, pressures or areas; exactly 0 where blocked.
 
         With a hardness NaN there: yielded patches are compact and leave channels, which
         only a simulation of the yielded gaps knows.
         """
-        asked = {
-            "mean_separation": mean_separation,
-            "separation": separation,
-            "pressure": pressure,
-        }
-        given = {name: known for name, known in asked.items() if known is not None}
-        if len(given) != 1:
-            raise InputError("give one of mean_separation, separation and pressure")
-        ((name, known),) = given.items()
-        if is_labelled(known):
-            return apply(lambda known: (self(**{name: known}),), (known,), 1)[0]  # type: ignore[no-any-return]
-        d = (self.law.separations if pressure is None else self.law.separation)(**given)
+        d = self.law.separation(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
+        if is_labelled(d):
+            return apply(lambda block: (self._at(block),), (d,), 1)[0]  # type: ignore[no-any-return]
+        return self._at(d)
+
+    def _at(self, d: Any) -> Numbers:
+        """Flow coefficient at separations d within the law."""
         flat = np.ascontiguousarray(d).reshape(-1)
         found = np.empty(flat.size)
         core.law_fill(flat, self.block, found, *[None] * 4)
         # bodies farther apart
         apart = (flat > self.block[fit.HIGHEST]) & (flat < np.inf)
-        gap = (self.law.h_max + flat[apart]) / 2
+        gap = self.law.both_separations("separation", flat[apart])[1]
         found[apart] = gap**3 * wide_gap(gap / self.h_rms)
         # what percolates in the elastic contact is not known to block the yielded one
         if self.law.hardness < np.inf and not getattr(

@@ -1,6 +1,5 @@
 """`contact_law`: pressure and area of one surface by any theory, fitted by polynomials of the gap (`law.block`)."""
 
-import contextlib
 import dataclasses
 import functools
 import math
@@ -19,21 +18,12 @@ from mbma_tables.law import block as fit
 from mbma_tables.law.law import ROUNDING, ContactLaw
 from mbma_tables.quantities.interface import NOTHING_BETWEEN, Interface
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.surface import Surface
-from mbma_tables.theories.base import Theory, UserTheory
-from mbma_tables.theories.mbma.island import check_band
-from mbma_tables.theories.mbma.island_models import MAX_RTOL, MIN_RTOL
-from mbma_tables.theories.mbma.profile import profile
-from mbma_tables.theories.mbma.tables import get_model
-from mbma_tables.theories.mbma.theory import Mbma
+from mbma_tables.theories.base import Compression, Theory, UserTheory
 
 MIN_LAW_RTOL = 1e-9
+MAX_RTOL = 0.1
 # for polynomials this accurate the last coefficients estimate the error
 RESOLVED = 1e-3
-# leading powers of h_max - d of MBMA's force and area
-POWERS = (3.5, 10 / 3)
-# of the boundary layer, up to which these powers dominate
-LAYER_SHARE = 0.5
 # octaves of x, below which a theory that ends at h_max is a power of h_max - u
 FIRST_OCTAVES = 20
 MOST_OCTAVES = 60
@@ -53,7 +43,7 @@ def contact_law(
     bodies: Bodies | float | str = 1.0,
     theory: str | Theory | UserTheory | None = None,
     *,
-    rtol: float = 1e-8,
+    rtol: float | None = None,
 ) -> ContactLaw:
     """Pressure and area of one surface as functions of its gap, for many gaps and for inverses.
 
@@ -63,15 +53,16 @@ def contact_law(
         One surface, not a batch.
     bodies : Bodies or float or str
         The bodies in contact, as for `contact`, each constant one number. With a hardness
-        it is the law of loading; its `energy` is then the work of loading, not that
-        recovered on unloading.
+        it is the law of first loading, which has no `energy`.
     theory : str or theory, optional
-        As for `contact`; by default "simulated" for a resolved map, else "calibrated".
-    rtol : float
+        As for `contact`; by default "simulated" for a resolved map, else "calibrated". The
+        law covers the gaps that the theory answers: with ``Mbma(outside="exact")`` also
+        those whose islands no table covers.
+    rtol : float, optional
         Requested relative error of the polynomials against the theory (MBMA's island
         model), in [1e-9, 0.1]; for other theories not below a tenth of their own error (its
         median over gaps), or not below that error where their results are not smooth within
-        it.
+        it. Default: that of ``Mbma(rtol=...)``, but at least 1e-9; 1e-8 of other theories.
 
     Returns
     -------
@@ -104,7 +95,7 @@ def law_of(
     surface: AnySurface,
     bodies: Any,
     theory: str | Theory | UserTheory | None,
-    rtol: float,
+    rtol: float | None,
     interface: Interface = NOTHING_BETWEEN,
 ) -> ContactLaw:
     """The law of one surface, with what a joint has between its bodies."""
@@ -120,21 +111,12 @@ def law_of(
             f"hardness must be one number, got shape {hardness.shape}: a law is of one surface"
         )
     one = _one_surface(surface)
-    tolerance = number_in("rtol", rtol, MIN_LAW_RTOL, MAX_RTOL)
-    setup = Setup(
-        one, given.at(modulus, float(hardness)), chosen_theory(surface, theory), interface
-    )
+    chosen = chosen_theory(surface, theory)
+    asked = max(chosen.rtol, MIN_LAW_RTOL) if rtol is None else rtol
+    tolerance = number_in("rtol", asked, MIN_LAW_RTOL, MAX_RTOL)
+    setup = Setup(one, given.at(modulus, float(hardness)), chosen, interface)
     loading = setup.theory_of(setup.bodies)
-    try:
-        if isinstance(loading, Mbma):
-            return _mbma_law(setup, loading, tolerance)
-        return theory_law(setup, loading, tolerance)
-    except ConvergenceError as fault:
-        if isinstance(loading, Mbma):
-            raise
-        raise ConvergenceError(
-            f"theory {loading.name!r}: {fault}; use a larger rtol", fault.mask
-        ) from None
+    return _law_of_theory(setup, loading, tolerance)
 
 
 def _one_surface(surface: AnySurface) -> AnySurface:
@@ -154,9 +136,7 @@ def _elastic_law(setup: Setup, rtol: float) -> ContactLaw:
     elastic = dataclasses.replace(setup.bodies.bodies, hardness=np.inf)
     bodies = dataclasses.replace(setup.bodies, bodies=elastic, hardness=np.inf)
     setup = dataclasses.replace(setup, bodies=bodies)
-    if isinstance(setup.theory, Mbma):
-        return _mbma_law(setup, setup.theory, rtol)
-    return theory_law(setup, setup.theory, rtol)
+    return _law_of_theory(setup, setup.theory, rtol)
 
 
 class _Fitting(NamedTuple):
@@ -173,57 +153,37 @@ class _Fitting(NamedTuple):
     leverage: float  # error of slopes over F/x per error of answers
 
 
-def _mbma_law(setup: Setup, theory: Mbma, rtol: float) -> ContactLaw:
-    """A law of the MBMA model: x rises from 0 at first contact, d = h_max, to 1 at the end.
+def _law_of_theory(setup: Setup, theory: Theory, rtol: float) -> ContactLaw:
+    """The law by the curves that a theory has for it, or else by its answers."""
+    curves = theory.law_curves(setup.surface, rtol)
+    if curves is not None:
+        return _law_of_curves(setup, curves, min(rtol, RESOLVED))
+    try:
+        return theory_law(setup, theory, rtol)
+    except ConvergenceError as fault:
+        raise ConvergenceError(
+            f"theory {theory.name!r}: {fault}; use a larger rtol", fault.mask
+        ) from None
 
-    Below half of the boundary layer force and area are powers of x times polynomials.
-    """
-    surface: Any = setup.surface
-    variant = theory.variant
-    h_max = float(surface.h_max)
-    h_rms = float(surface.h_rms)
-    # the sums over islands are to be ten times as accurate as the polynomials
-    rtol_of_sums = max(0.1 * rtol, MIN_RTOL)
-    model = get_model(theory.island_model, rtol_of_sums, variant)
-    stress = 1.0
-    shape: Any = surface
-    if isinstance(surface, Surface):
-        check_band(surface, variant)
-        # totals of a self-affine surface are over q0 s, too
-        stress = float(surface.q0 * surface.s)
-        shape = float(surface.hurst), float(surface.zeta_1), h_max / h_rms
-    totals = profile(shape, model, variant, rtol_of_sums)
-    # the law ends with the island model's table; rounding may pass full compression
-    end = min(float(totals.edges[-1]) * h_rms, 2 * h_max)
 
-    def force_and_area(x: FloatArray) -> FloatArray:
-        sums = totals.totals(x * end / h_rms)
-        if not sums.all():
-            raise OutOfRangeError(
-                f"h_max is {h_max / h_rms:g} h_rms, so high that force or area underflow"
-            )
-        sums[0] *= stress
-        sums[1] = variant.area_of(sums[1])
-        return sums
-
-    kinks = (totals.source.breaks[-2:] * h_rms / end).tolist()
-    layer = LAYER_SHARE * totals.source.layer * h_rms / end
-    tolerance = min(rtol, RESOLVED)
+def _law_of_curves(setup: Setup, curves: Compression, tolerance: float) -> ContactLaw:
+    """A law by compressions: x rises from 0 at first contact, d = h_max, to 1 at the end."""
+    h_max = float(setup.surface.h_max)
 
     def record_below(start: float) -> fit.First:
-        return fit.power_record(force_and_area, start, POWERS)
+        return fit.power_record(curves.values, start, curves.powers)
 
-    # a power of 1/2 within the layer, and down to the smallest double at most
-    octaves = range(math.ceil(-math.log2(min(layer, *kinks))), 1100)
+    # the leading powers within the layer, and down to the smallest double at most
+    octaves = range(math.ceil(-math.log2(min(curves.layer, *curves.kinks))), 1100)
     start, first = fit.first_record(record_below, octaves, tolerance)
     fitting = _Fitting(
-        scale=1 / end,
-        sides=[fit.Side(-1, start, force_and_area, tuple(kinks))],
+        scale=1 / curves.end,
+        sides=[fit.Side(-1, start, curves.values, curves.kinks)],
         first=first,
-        limits=(h_max - end, math.inf),
+        limits=(h_max - curves.end, math.inf),
         energy_beyond=0.0,
-        answer_errors=[np.array([totals.error])],
-        leverage=totals.leverage,
+        answer_errors=[np.array([curves.error])],
+        leverage=curves.leverage,
     )
     return _fitted_law(fitting, tolerance, setup)
 
@@ -236,7 +196,7 @@ def theory_law(setup: Setup, theory: Theory, rtol: float) -> ContactLaw:
     """
     surface: Any = setup.surface
     h_max = float(surface.h_max)
-    lowest, highest = _covered(surface, theory)
+    lowest, highest, ends_at_h_max = _covered(surface, theory)
     answer_errors: list[FloatArray] = []
 
     def force_and_area(u: FloatArray) -> FloatArray:
@@ -260,9 +220,9 @@ def theory_law(setup: Setup, theory: Theory, rtol: float) -> ContactLaw:
     tolerance = max(min(rtol, RESOLVED), SHARE * error_of_answers)
 
     width, sides, first = _sides(
-        surface, theory, force_and_area, (lowest, highest), tolerance
+        surface, theory, force_and_area, (lowest, highest), ends_at_h_max, tolerance
     )
-    if theory.ends_at_h_max:
+    if ends_at_h_max:
         largest_gap = math.inf
         energy_beyond = 0.0
     else:
@@ -286,16 +246,16 @@ def theory_law(setup: Setup, theory: Theory, rtol: float) -> ContactLaw:
         return _fitted_law(fitting, error_of_answers, setup)
 
 
-def _covered(surface: AnySurface, theory: Theory) -> tuple[float, float]:
-    """Least and largest mean separation of a law."""
+def _covered(surface: AnySurface, theory: Theory) -> tuple[float, float, bool]:
+    """Least and largest mean separation of a law, and whether the largest is last contact."""
     # below the elastic theory's end, and with a hardness towards u = 0, force depends on
     # the logarithm of u
     shares = LOWEST if theory.elastic is theory else LOWEST[1:]
     lowest = _lowest(surface, theory.elastic, shares)
     h_max = float(surface.h_max)
-    if theory.ends_at_h_max:
-        return lowest, h_max
-    return lowest, min(float(theory.interval(surface)[1]), MAX_SPAN * h_max)
+    if theory.ends_at_h_max and np.isinf(theory.domain(surface)[1]):
+        return lowest, h_max, True
+    return lowest, min(float(theory.interval(surface)[1]), MAX_SPAN * h_max), False
 
 
 def _sides(
@@ -303,13 +263,14 @@ def _sides(
     theory: Theory,
     force_and_area: fit.Values,
     covered: tuple[float, float],
+    ends_at_h_max: bool,
     tolerance: float,
 ) -> tuple[float, list[fit.Side], fit.First]:
     """Mean separation over which x rises to 1; the sides of a law; the record where x begins."""
     h_max = float(surface.h_max)
     lowest, highest = covered
     bends = np.asarray(theory.bends(surface), dtype=float)
-    if not theory.ends_at_h_max:
+    if not ends_at_h_max:
         width = highest
     elif lowest:
         # two sides, which meet in the middle
@@ -324,7 +285,7 @@ def _sides(
         return force_and_area(h_max - width * x)
 
     above = fit.Side(1, lowest / width, towards_full_compression, tuple(bends / width))
-    if theory.ends_at_h_max:
+    if ends_at_h_max:
         start = 2.0**-FIRST_OCTAVES
         kinks = tuple((h_max - bends) / width)
         below = fit.Side(-1, start, towards_first_contact, kinks)
@@ -401,15 +362,24 @@ def _fitted_law(fitting: _Fitting, tolerance: float, setup: Setup) -> ContactLaw
 def _lowest(surface: AnySurface, theory: Theory, shares: tuple[float, ...]) -> float:
     """Mean separation from which a theory has finite force.
 
-    It is the least of these shares of h_max, or where the theory's answers begin.
+    It is the least of these shares of h_max within the theory's domain, or where its
+    answers begin.
     """
-    separations = [share * float(surface.h_max) for share in shares]
+    low = float(theory.domain(surface)[0])
+    separations = [max(low, share * float(surface.h_max)) for share in shares]
     separations.append(float(theory.interval(surface)[0]))
+    cause: Exception | None = None
     for u in separations:
-        with np.errstate(all="ignore"), contextlib.suppress(InputError):
-            pressure = float(theory.answer(surface, np.array(u)).pressure)
-            if 0 < pressure < math.inf:
-                return u
+        try:
+            with np.errstate(all="ignore"):
+                pressure = float(theory.answer(surface, np.array(u)).pressure)
+        except Exception as fault:  # of any kind, as theories may be a user's
+            cause = fault
+            continue
+        if 0 < pressure < math.inf:
+            return u
+    reason = f" ({cause})" if cause is not None else ""
     raise OutOfRangeError(
-        f"theory {theory.name!r} has no finite force on this surface up to u = {u:.6g}"
-    )
+        f"theory {theory.name!r} has no finite force on this surface up to "
+        f"u = {separations[-2]:.6g}{reason}; its method `interval` states where it is defined"
+    ) from cause

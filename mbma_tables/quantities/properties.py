@@ -188,7 +188,7 @@ class ContactQuantities:
 
 
 class LawQuantities:
-    """Quantities of a law, as functions of the mean separation, the separation or the pressure."""
+    """Quantities of a law, as functions of a gap, the pressure or the area."""
 
     def mean_separation(
         self: Any,
@@ -196,9 +196,12 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Mean separation u = (h_max + d)/2 (50) [length]: the mean gap, with yielded points flattened."""
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("mean_separation")
         return value
 
@@ -208,9 +211,12 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Gap between the mean planes [length]: u less the flattening of yielded points."""
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("plane_separation")
         return value
 
@@ -220,9 +226,12 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Mean pressure in the contact, F/A [stress]; NaN where there is none."""
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("mean_pressure")
         return value
 
@@ -232,9 +241,12 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Share of the contact area at the hardness, 0 to 1."""
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("yielded")
         return value
 
@@ -244,9 +256,12 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Plasticity index E* g/p_m, g the rms gradient; 0 where the hardness is infinite."""
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("psi")
         return value
 
@@ -256,9 +271,12 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Hardness above which the elastic area is within 5%, E* g/1.1 [stress]."""
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("elastic_hardness")
         return value
 
@@ -268,9 +286,12 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Tangential stiffness of full stick [stress/length], `unloading_stiffness`/kappa (Mindlin 1949)."""
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("tangential_stiffness")
         return value
 
@@ -280,6 +301,7 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Thermal or electrical conductance of the solid spots, h = (k_s/E*) (-dF/du), at constant contact area.
 
@@ -287,7 +309,9 @@ class LawQuantities:
         459 (2003) 53). In W/(m^2 K) for conductivities such as "45 W/(m K)", in S/m^2 for "6e6 S/m".
         The slope of the loading curve of yielded contacts is up to ten times smaller.
         """
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("conductance")
         return value
 
@@ -297,9 +321,12 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Thermal conductance of the gas in the gaps, parallel to that of the solid spots [W/(m^2 K)]."""
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("gas_conductance")
         return value
 
@@ -309,9 +336,12 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Thermal conductance of the solid spots and of the gas in parallel [W/(m^2 K)]."""
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("total_conductance")
         return value
 
@@ -321,9 +351,12 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Flow coefficient K of the gaps [length^3], `leakage.K`."""
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("flow_coefficient")
         return value
 
@@ -333,9 +366,12 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """K^(1/3) [length], the gap of parallel plates with the same flow."""
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("hydraulic_aperture")
         return value
 
@@ -345,9 +381,12 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Model uncertainty, one standard deviation of ln of the flow coefficient."""
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("leakage_scatter")
         return value
 
@@ -357,9 +396,12 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Model uncertainty, one standard deviation of ln F at this mean separation; NaN if unknown."""
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("scatter")
         return value
 
@@ -369,9 +411,12 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Model uncertainty, one standard deviation of ln A at this pressure."""
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("area_scatter")
         return value
 
@@ -381,6 +426,7 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Model uncertainty, one standard deviation of ln `stiffness` at this pressure.
 
@@ -388,7 +434,9 @@ class LawQuantities:
         not compared with simulations; `unloading_stiffness_scatter` is that of their unloading
         stiffness and conductance.
         """
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("stiffness_scatter")
         return value
 
@@ -398,13 +446,16 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Model uncertainty, one standard deviation of ln `unloading_stiffness` at this pressure.
 
         Also of the conductance and of the tangential stiffness, which are proportional to it.
         Without a hardness both stiffnesses are the same, and so are their uncertainties.
         """
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("unloading_stiffness_scatter")
         return value
 
@@ -414,9 +465,12 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Model uncertainty of the mean separation at this pressure [length], `scatter` times F/(-dF/du)."""
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("separation_scatter")
         return value
 
@@ -426,9 +480,12 @@ class LawQuantities:
         *,
         separation: ArrayLike | str | None = None,
         pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
     ) -> Numbers:
         """Whether the theory was tested for such contacts; if not, `reasons` gives where and why."""
-        contact = self.at(mean_separation, separation=separation, pressure=pressure)
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
         value: Numbers = contact.quantity("valid")
         return value
 

@@ -11,6 +11,12 @@ from mbma_tables.quantities.tangential import tangential_ratio_of
 STIFFNESS = Dimension(stress=1, length=-1)
 ENERGY = Dimension(stress=1, length=1)
 
+# of contacts and of their laws
+ENERGY_OF_YIELDED = (
+    "energy: the energy that a yielded contact gives back is not known, since its residual "
+    "shape is not; unloading_stiffness is the initial stiffness of unloading"
+)
+
 POISSONS_RATIO = Need(
     "nu",
     lambda contact: contact.bodies.bodies.nu is not None,
@@ -63,11 +69,7 @@ def tangential_stiffness(contact: State) -> Any:
 def energy(contact: State) -> Any:
     """Elastic energy per nominal area [stress length], the integral of F/A0 over u; of elastic contacts alone."""
     if contact.yields:
-        raise InputError(
-            "energy: the energy that a yielded contact gives back is not known, since its residual shape is not; "
-            "the energy of its contact law is the work of loading, unloading_stiffness the initial stiffness of "
-            "unloading"
-        )
+        raise InputError(ENERGY_OF_YIELDED)
     return contact.evaluate(
         lambda theory, surface, u, E_star: (E_star * theory.energy(surface, u),)
     )[0]

@@ -22,6 +22,7 @@ from mbma_tables.theories.evidence import shipped_deviations
 
 LOOKS = 128  # initial gaps of an inversion, for one surface
 FEW_LOOKS = 8  # and for each of a batch
+ROUNDING = 4 * float(np.finfo(float).eps)  # relative, of gaps beside the ends of a domain
 
 # values at mean separations, approximately their -d/du, and whether this is exact
 Curve = Callable[[FloatArray], tuple[FloatArray, FloatArray, bool]]
@@ -37,6 +38,19 @@ class TheoryAnswer(NamedTuple):
     stiffness: FloatArray  # -d(F/(A0 E*))/du [1/length]
     # bound on the relative numerical error of force and area, against the theory itself
     error: FloatArray
+
+
+class Compression(NamedTuple):
+    """Force and area of a theory as functions of the compression h_max - d, for a law."""
+
+    end: float  # largest compression [length]
+    # rows of F/(A0 E*) and A/A0 at x, compressions over `end`
+    values: Callable[[FloatArray], FloatArray]
+    kinks: tuple[float, ...]  # x at which derivatives jump
+    layer: float  # x below which `powers` of x lead in force and area
+    powers: tuple[float, float]
+    error: float  # bound on the relative error of the values
+    leverage: float  # error of slopes over F/x per error of values
 
 
 @runtime_checkable
@@ -63,6 +77,9 @@ class Theory(abc.ABC):
     # one line of advice; origin of its numbers, if not a shipped file
     advice = ""
     origin = ""
+    # what answers are beyond its table of islands, where it has one: one of `OUTSIDE` of MBMA
+    outside = "raise"
+    rtol = 1e-8  # relative error that its laws aim at
     looks = LOOKS  # initial gaps of an inversion, for one surface
     reached = 0.0  # relative amount by which a wanted value may exceed the largest
     bends_in_area = False  # whether at its `bends` only the area is not smooth
@@ -143,10 +160,23 @@ class Theory(abc.ABC):
     ) -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] between which "pressure" or "area" decreases.
 
-        These are full compression and last contact.
+        By default these are full compression and last contact. No contact and no law asks a
+        theory for an answer beyond them, unless its `domain` is wider.
         """
-        high = np.asarray(surface.h_max, dtype=float)
-        return np.zeros_like(high), high
+        h_max = np.asarray(surface.h_max, dtype=float)
+        high = h_max if self.ends_at_h_max else np.full_like(h_max, np.inf)
+        return np.zeros_like(h_max), high
+
+    def domain(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
+        """Mean separations [length] between which the theory answers.
+
+        By default those of `interval`; bodies farther apart than h_max do not touch where
+        contact ends there.
+        """
+        low, high = self.interval(surface)
+        if self.ends_at_h_max:
+            high = np.where(high < np.asarray(surface.h_max), high, np.inf)
+        return low, high
 
     def bends(self, surface: AnySurface) -> FloatArray:
         """Mean separations [length], two at most, at which derivatives of force or area jump.
@@ -186,6 +216,10 @@ class Theory(abc.ABC):
         )
         scatter = np.broadcast_to(scatter, shape)
         return np.where(tested.is_compared(surface), scatter, np.nan)
+
+    def law_curves(self, surface: AnySurface, rtol: float) -> Compression | None:
+        """Curves for the law of one surface to a relative error; None: it is fitted to answers."""
+        return None
 
     def gaps(self) -> Any:
         """Of a simulated map, the theory that knows the flow through its gaps."""
@@ -346,6 +380,32 @@ class Theory(abc.ABC):
                 beyond,
             )
         return np.asarray(wanted >= largest)
+
+
+def require_domain(
+    theory: Theory,
+    surface: AnySurface,
+    name: str,
+    gap: FloatArray,
+    mean_separation: FloatArray,
+) -> None:
+    """Reject gaps beyond the `domain` of a theory; `name` is that of the gaps as given."""
+    low, high = theory.domain(surface)
+    # ends that are no round numbers are met but for rounding
+    inside = mean_separation >= low * (1 - ROUNDING)
+    inside &= mean_separation <= high * (1 + ROUNDING)
+    if np.all(inside):
+        return
+    least, most = (
+        describe_entries(np.broadcast_to(end, inside.shape), ~inside)
+        for end in (low, high)
+    )
+    require(
+        name,
+        gap,
+        inside,
+        f"where theory {theory.name!r} is defined, u from {least} to {most}",
+    )
 
 
 def curve_values(

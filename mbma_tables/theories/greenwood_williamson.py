@@ -58,6 +58,11 @@ class GreenwoodWilliamson(Theory):
         )
         return np.zeros_like(high), high
 
+    def domain(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
+        """All mean separations from 0; the force of wide gaps underflows to zero."""
+        low = np.zeros(surface.shape)
+        return low, np.full_like(low, np.inf)
+
     def reasons(
         self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray
     ) -> dict[str, Any]:

@@ -193,7 +193,7 @@ def test_what_is_refused():
     cases += [(found.displacement, (1e9,), "at most the friction times the pressure")]
     cases += [
         (found.shear, ("1 MPa",), "pressure= takes"),
-        (law.tangential, (), "one of them"),
+        (law.tangential, (), "give exactly one of"),
     ]
     for ask, given, match in cases:
         with pytest.raises(
@@ -202,7 +202,7 @@ def test_what_is_refused():
             ask(*given)
     with pytest.raises(InputError, match="slip needs friction"):
         _ = apart.tangential().gross_slip
-    with pytest.raises(InputError, match="one of them"):
+    with pytest.raises(InputError, match="give exactly one of"):
         law.tangential(mean_separation=2.0, pressure=1e-3)
 
 

@@ -115,7 +115,7 @@ def test_leakage_apart_and_where_gaps_close(name, compiled):
     leakage = functools.partial(compiled[name], "leakage")
     apart = np.geomspace(1e-9, 1e3 if math.isinf(law.highest) else 26, 200)
     np.testing.assert_allclose(
-        leakage(-apart), law.leakage(separation=law.h_max + 2 * apart), rtol=VALUES
+        leakage(-apart), law.leakage(law.h_max + apart), rtol=VALUES
     )
     if name != "mbma":
         blocked = law.h_max - law.leakage.blocked_at

@@ -85,13 +85,17 @@ def answer_islands(
     given: Any = model.answer(islands["X"], islands["mu"])
     try:
         phi_F, phi_A, error = (
-            np.broadcast_to(np.asarray(part, dtype=float), shape) for part in given
+            np.array(np.broadcast_to(part, shape), dtype=float) for part in given
         )
     except (TypeError, ValueError) as fault:
         wanted = f"must answer Phi_F, Phi_A and error of shape {shape}"
         raise InputError(f"island model {model.name!r} {wanted}: {fault}") from None
     bad = ~(np.isfinite(phi_F) & np.isfinite(phi_A) & (error >= 0))
-    if outside != "nan" and bad.any():
+    if outside == "exact" and bad.any():
+        solved = SOLVER.answer(islands["X"][bad], islands["mu"][bad])
+        for part, exact in zip((phi_F, phi_A, error), solved, strict=True):
+            part[bad] = exact
+    elif outside != "nan" and bad.any():
         raise OutOfRangeError(
             f"island model {model.name!r} has no result for {int(bad.sum())} islands", bad
         )

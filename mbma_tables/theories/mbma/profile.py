@@ -519,7 +519,9 @@ def _profile(
     if isinstance(surface, MeasuredSurface):
         refuse_bands(model)
     source = source_of(surface, variant)
+    by_table = False
     if rows == 2 and isinstance(surface, tuple) and isinstance(model, UniversalModel):
+        by_table = True
         fields = _fields_by_table(surface, model, variant)
     else:
         fields = _fields(source, model, "exact" if outside == "exact" else "nan", rows)
@@ -530,6 +532,11 @@ def _profile(
             try:
                 return _built(source, fields, edges, rtol)
             except _EndOfTable as fault:
+                if by_table and outside == "exact":
+                    # islands beyond the table are solved one by one
+                    by_table = False
+                    fields = _fields(source, model, outside, rows)
+                    continue
                 end = fault.args[0]
                 edges = np.append(edges[edges < end * (1 - 1e-12)], end)
 

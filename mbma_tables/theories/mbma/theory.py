@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.common.arguments import FloatArray, require
+from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.shared import shared_property
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories.base import (
+    Compression,
     Curve,
     Theory,
     TheoryAnswer,
@@ -21,6 +23,7 @@ from mbma_tables.theories.base import (
 from mbma_tables.theories.mbma.geometry import kinks
 from mbma_tables.theories.mbma.island import check_band
 from mbma_tables.theories.mbma.island_models import (
+    MIN_RTOL,
     AnyModel,
     check_outside,
     island_model_name,
@@ -31,6 +34,9 @@ from mbma_tables.theories.mbma.tables import get_model
 from mbma_tables.theories.mbma.variants import NAMED, Variant, get_variant
 
 SCAN = 49  # compressions at which force, area and stiffness are searched for a maximum
+# leading powers of h_max - d of force and area
+POWERS = (3.5, 10 / 3)
+LAYER_SHARE = 0.5  # of the boundary layer, up to which these powers dominate
 MAX_AREA = 0.1  # above it islands begin to overlap (docs/fidelity.md)
 
 
@@ -115,6 +121,49 @@ class Mbma(Theory):
 
         return values
 
+    def law_curves(self, surface: AnySurface, rtol: float) -> Compression:
+        """Totals of a profile of islands, to the island model's end or full compression.
+
+        Below half of the boundary layer force and area are powers of the compression times
+        polynomials.
+        """
+        # the sums over islands are to be ten times as accurate as the polynomials
+        rtol_of_sums = min(max(0.1 * rtol, MIN_RTOL), self.rtol)
+        model = get_model(self.island_model, rtol_of_sums, self.variant)
+        h_max = float(surface.h_max)
+        h_rms = float(surface.h_rms)
+        stress = 1.0
+        shape: Any = surface
+        if isinstance(surface, Surface):
+            check_band(surface, self.variant)
+            # totals of a self-affine surface are over q0 s, too
+            stress = float(surface.q0 * surface.s)
+            shape = float(surface.hurst), float(surface.zeta_1), h_max / h_rms
+        outside = "exact" if self.outside == "exact" else "nan"
+        totals = profile(shape, model, self.variant, rtol_of_sums, outside)
+        # rounding may pass full compression
+        end = min(float(totals.edges[-1]) * h_rms, 2 * h_max)
+
+        def force_and_area(x: FloatArray) -> FloatArray:
+            sums = totals.totals(x * end / h_rms)
+            if not sums.all():
+                raise OutOfRangeError(
+                    f"h_max is {h_max / h_rms:g} h_rms, so high that force or area underflow"
+                )
+            sums[0] *= stress
+            sums[1] = self.variant.area_of(sums[1])
+            return sums
+
+        return Compression(
+            end=end,
+            values=force_and_area,
+            kinks=tuple((totals.source.breaks[-2:] * h_rms / end).tolist()),
+            layer=LAYER_SHARE * totals.source.layer * h_rms / end,
+            powers=POWERS,
+            error=totals.error,
+            leverage=totals.leverage,
+        )
+
     def bends(self, surface: AnySurface) -> FloatArray:
         """Mean separations [length] at which the largest island reaches floors (27, 30).
 
@@ -149,6 +198,14 @@ class Mbma(Theory):
         else:
             check_band(surface, self.variant)
         return self._maximum(surface, quantity, lowest), high
+
+    def domain(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
+        """All mean separations from 0: answers are beyond the largest force, too.
+
+        Where islands lie outside their table, `outside` says what happens.
+        """
+        low = np.zeros(surface.shape)
+        return low, np.full_like(low, np.inf)
 
     def softening(self, surface: AnySurface) -> FloatArray:
         """Mean separation [length] below which stiffness falls with compression.

@@ -258,6 +258,11 @@ class Yielding(Theory):
         low = np.maximum(low, LEAST if self.ends_at_h_max else CLOSED * h_rms)
         return low, np.minimum(high, MAX_LEVEL * h_rms)
 
+    def domain(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
+        """That of the elastic theory."""
+        domain: tuple[FloatArray, FloatArray] = self.elastic.domain(surface)
+        return domain
+
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
         """Force without the area, which is computed from it."""
         if quantity != "pressure":
