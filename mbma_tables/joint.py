@@ -442,7 +442,7 @@ class Joint(JointQuantities, Displayed):
         target: str,
         pressures: tuple[float | str, float | str] | None = None,
         name: str | None = None,
-        heat: bool = True,
+        heat: bool | None = None,
         friction_pressure: float | str | None = None,
         *,
         path: str | os.PathLike[str] | None = None,
@@ -472,8 +472,9 @@ class Joint(JointQuantities, Displayed):
         name : str, optional
             Name of the surface interaction or of the functions, or what names begin with;
             formats without names have it in their comments.
-        heat : bool
-            Whether the conductance is also written.
+        heat : bool, optional
+            Whether the conductance is also written. By default it is; code leaves it out,
+            as its comments say, where the joint has no thermal conductivity.
         friction_pressure : float or str, optional
             Pressure at which a friction card's tangential stiffness is computed; default:
             the geometric mean.
@@ -491,12 +492,12 @@ class Joint(JointQuantities, Displayed):
             Of the file: mm and MPa, with conductance in mW/(mm^2 K), or those that the
             program prescribes.
         leakage : bool
-            Functions have the flow coefficient of the gaps, too.
+            Functions have the flow coefficient of the gaps, too; rows have it alone.
         peklenik : float, optional
             Of a film, as for `flow_factors`.
         binaries : {"here", "all", "none"}, optional
             Of an FMU.
-        made_by : tuple of str
+        made_by : sequence of str
             Lines of the header on how the file was made.
 
         Returns
@@ -504,13 +505,15 @@ class Joint(JointQuantities, Displayed):
         str, bytes or list of pathlib.Path
             Without a path the first file of the target, bytes of a binary format; with a
             path the paths of all files. Solver input has a friction card if the joint has a
-            coefficient of friction; functions contain the tangential stiffness.
+            coefficient of friction; functions contain the tangential stiffness, which
+            needs Poisson's ratio of the bodies: comments say so where it is missing.
 
         Raises
         ------
         InputError
-            For an option that the target does not take, and for a target that is several
-            files without a path.
+            For an option that the target does not take or that has a wrong type, for
+            target "c", which is the whole model, and for a target that is several files
+            without a path.
 
         Examples
         --------
@@ -525,7 +528,10 @@ class Joint(JointQuantities, Displayed):
         from mbma_tables.export.of_joint import joint_files
         from mbma_tables.export.targets import write_files
 
-        out = None if path is None else pathlib.Path(path)
+        try:
+            out = None if path is None else pathlib.Path(path)
+        except TypeError:
+            raise InputError(f"path must be that of a file, got {path!r}") from None
         files = joint_files(
             self._exported(),
             target,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import MAX_BYTES, read_file, write_file
 from mbma_tables.common.progress import echo
-from mbma_tables.export.targets import AGAINST, Target, targets, write_files
+from mbma_tables.export.targets import AGAINST, OPTIONS, Target, targets, write_files
 from mbma_tables.export.text import written_by
 from mbma_tables.materials import tangential_ratio
 from mbma_tables.scenes.specimen import Specimen
@@ -23,7 +23,7 @@ from mbma_tables.scenes.specimen import Specimen
 if TYPE_CHECKING:
     from mbma_tables.export.law_table import LawTable
 
-DEFAULTS = {"variant": "reported", "leakage": False, "check": False}
+DEFAULTS = {"variant": "reported", "check": False}
 
 
 class _Export(click.Command):
@@ -47,14 +47,7 @@ class _Export(click.Command):
     help="File to write; a folder for source code.",
 )
 @options.optional_specimen_options
-@click.option(
-    "--rows", type=int, help="Number of rows of a table; else as few as --rtol needs."
-)
-@click.option(
-    "--rtol",
-    type=float,
-    help="Largest relative error of linear interpolation; 1e-3 by default.",
-)
+@options.file_options
 @click.option(
     "--conductivity",
     type=float,
@@ -76,39 +69,10 @@ class _Export(click.Command):
     type=float,
     help="Coefficient for friction cards, whose stiffness before slip needs --nu.",
 )
-@options.quantity_option(
-    "--friction-pressure", help="At which that stiffness holds; else amid --pressures."
-)
-@click.option(
-    "--leakage",
-    is_flag=True,
-    help="Flow coefficient of the gaps: rows of it alone, laws as code with it.",
-)
 @click.option(
     "--direction",
     metavar="x|y|DEGREES",
     help="Of leakage of a map; else the mean of both axes.",
-)
-@click.option(
-    "--quantity",
-    type=click.Choice([*AGAINST]),
-    help="Of the rows; by default that which TARGET takes.",
-)
-@click.option(
-    "--peklenik",
-    type=float,
-    help="Of a film: length of the roughness along x over that along y.",
-)
-@click.option(
-    "--pressures",
-    metavar="X:X",
-    help="Smallest and largest pressure: where the error holds, and the rows end.",
-)
-@click.option("--name", help="Of the interaction, table, functions or module.")
-@click.option(
-    "--binaries",
-    type=click.Choice(["here", "all", "none"]),
-    help="In an FMU: for this platform, for all by zig, or none.",
 )
 @options.theory_option
 @options.hardness_option
@@ -118,7 +82,7 @@ class _Export(click.Command):
     is_flag=True,
     help="Of the whole model: build it and replay its conformance points.",
 )
-def export_command(target: str, out: Path, **values: Any) -> None:
+def export_command(target: str, out: Path, asked: dict[str, Any], **values: Any) -> None:
     """Write TARGET to a file.
 
     Solvers and data take a surface, a modulus and units, and so do laws as code (-law),
@@ -132,90 +96,132 @@ def export_command(target: str, out: Path, **values: Any) -> None:
         name: value
         for name, value in values.items()
         if value is not None and value != DEFAULTS.get(name)
-    }
+    } | asked
     kind = targets()[target]
     code = target in targets("CODE")
-    words = {"specimen": "the surface", "kappa": "--nu"}
-    taken = kind.takes if code else kind.takes | {"specimen"}
-    if unused := [
-        words.get(name, f"--{name.replace('_', '-')}")
-        for name in given
-        if name not in taken
-    ]:
-        raise InputError(f"without effect on {target}: leave {' and '.join(unused)} out")
+    _refuse_unused(kind, given, code)
     if "direction" in given and "leakage" not in given:
         raise InputError("--direction is of leakage: add --leakage or leave it out")
     if code:
         _export_code(out, values["variant"], "check" in given)
         return
-    specimen: Specimen | None = given.pop("specimen", None)
+    specimen = _checked_specimen(given.pop("specimen", None))
+    if kind.units is not None:
+        specimen = specimen.in_units(*kind.units)
+    file_name = None if str(out) == "-" else out
+    named, line_of_name = kind.place_of_name(given.pop("name", None), file_name)
+    law: dict[str, Any] = {
+        name: getattr(specimen, name) for name in ("surface", "E_star", "stress_unit")
+    }
+    law["made_by"] = (*line_of_name, *_inputs(), written_by(_context().obj[1:]))
+    if kind.rows:
+        files = kind.files(_rows(kind, law | given), **named)
+    else:
+        files = kind.files(**law, **given, **named)
+    show_written(kind, out, files)
+
+
+def _context() -> click.Context:
+    return click.get_current_context()
+
+
+def _refuse_unused(kind: Target, given: Mapping[str, Any], code: bool) -> None:
+    """Refuse options without effect."""
+    words = {"specimen": "the surface", "kappa": "--nu"}
+    taken = kind.takes if code else kind.takes | {"specimen", "name"}
+    unused = [
+        words.get(name, f"--{name.replace('_', '-')}")
+        for name in sorted(given)
+        if name not in taken
+    ]
+    if unused:
+        raise InputError(
+            f"without effect on {kind.name}: leave {' and '.join(unused)} out"
+        )
+
+
+def _checked_specimen(specimen: Specimen | None) -> Specimen:
     if specimen is None:
         raise InputError(
             "one surface is needed: see the options --surface, --file, --map, --hurst"
         )
     if specimen.E_star is None:
         raise InputError("a modulus is needed: --E-star, or all of --E1 --nu1 --E2 --nu2")
-    if kind.units is not None:
-        specimen = specimen.in_units(*kind.units)
-    if kind.end and out.suffix != kind.end:
-        raise InputError(f"--out of {target} must be NAME{kind.end}, got {out.name!r}")
-    joint: dict[str, Any] = {
-        name: getattr(specimen, name) for name in ("surface", "E_star", "stress_unit")
-    }
-    ctx = click.get_current_context()
-    inputs = [ctx.params[key] for key in ("file", "map") if ctx.params[key]]
+    return specimen
+
+
+def _inputs() -> Iterator[str]:
+    """Lines of a header with the files that were read, and their digests."""
+    asked = _context().params
+    inputs = [asked[key] for key in ("file", "map") if asked[key]]
     for path in [path for path in inputs if path.suffix == ".toml"]:
         table = tomllib.loads(read_file(path, MAX_BYTES).decode()).get("surface", {})
         inputs += [path.parent / table["map"]] if "map" in table else []
-    digests = (
-        f"input {path}: sha256 {hashlib.sha256(read_file(path, MAX_BYTES)).hexdigest()}"
-        for path in inputs
-    )
-    joint["made_by"] = *digests, written_by(ctx.obj[1:])
-    if kind.rows:
-        name = (
-            {"name": out.stem}
-            if kind.end
-            else {"name": given.pop("name")}
-            if "name" in given
-            else {}
-        )
-        files = kind.files(_rows(kind, joint | given), **name)
-    else:
-        files = kind.files(**joint, **given)
-    show_written(out, files)
+    for path in inputs:
+        digest = hashlib.sha256(read_file(path, MAX_BYTES)).hexdigest()
+        yield f"input {path}: sha256 {digest}"
 
 
-def show_written(out: Path, files: Mapping[str, bytes]) -> None:
+def show_written(kind: Target, out: Path, files: Mapping[str, bytes]) -> None:
     """Write the files of a target and print their paths; to standard output the first one alone."""
     if str(out) == "-":
-        write_file(out, files[""])
+        write_first(kind, files[""])
         return
     for path in write_files(out, files):
         echo(path)
 
 
-def _rows(target: Target, asked: dict[str, Any]) -> LawTable:
-    """Rows of a law; requested pressures at which it is not valid are reported."""
-    from mbma_tables.export.law_rows import describe_law
+def write_first(kind: Target, content: bytes) -> None:
+    """Write the first file of a target to standard output, and name those that are left out.
 
+    Raises
+    ------
+    InputError
+        Where the first file needs the others.
+    """
+    beside = ", ".join(f"NAME{end}" for end in kind.beside)
+    if not kind.alone:
+        raise InputError(
+            f"{kind.name} is several files, of which the first needs {beside}: --out FILE writes all"
+        )
+    write_file(Path("-"), content)
+    if beside:
+        echo(f"left out: {beside}; --out FILE writes all", err=True)
+
+
+def _rows(target: Target, asked: dict[str, Any]) -> LawTable | list[LawTable]:
+    """Rows of each quantity; requested pressures at which they are not valid are reported."""
     heat = (
         "conductance"
         if asked.keys() & {"conductivity", "conductivity_unit"}
         else target.quantity
     )
-    asked.setdefault("quantity", "leakage" if asked.pop("leakage", False) else heat)
-    asked["most_rows"] = target.most.get(asked["quantity"])
+    leakage = asked.pop("leakage", False)
+    names = asked.pop("quantity", ["leakage" if leakage else heat])
+    for name in names:
+        require_name("quantity of rows", name, AGAINST)
+    if len(names) > 1 and not target.several:
+        raise InputError(f"{target.name} has one quantity a file: give one of {names}")
+    laws = []
+    for name in names:
+        of_others: set[str] = set()
+        for other in names:
+            of_others |= OPTIONS.get(other, set())
+        of_others -= OPTIONS.get(name, set())
+        own = {key: value for key, value in asked.items() if key not in of_others}
+        laws.append(_rows_of(target, name, own))
+    return laws[0] if len(laws) == 1 else laws
+
+
+def _rows_of(target: Target, quantity: str, asked: dict[str, Any]) -> LawTable:
+    from mbma_tables.export.law_rows import describe_law
+
+    asked = asked | {"quantity": quantity, "most_rows": target.most.get(quantity)}
     if target.quantity == "conductance":  # its numbers do not depend on the conductivity
         asked = {"conductivity": 1.0, "conductivity_unit": "W/(m K)"} | asked
-    if "pressures" not in asked:
-        return describe_law(**asked)
-    asked["pressures"] = tuple(str(asked["pressures"]).split(":"))
-    if len(asked["pressures"]) != 2:
-        raise InputError(
-            f"--pressures must be like 0.1:100 or 0.1MPa:100MPa, got {':'.join(asked['pressures'])!r}"
-        )
     law = describe_law(**asked)
+    if "pressures" not in asked:
+        return law
     rows = law.behaviour or law
     for line in rows.comments:
         # a limit below the smallest requested pressure does not matter

@@ -308,6 +308,69 @@ _SPECIMEN_OPTIONS = (
 )
 map_options = option_group("treatment", given_values, *_MAP_OPTIONS, length_unit("unit"))
 specimen_options = option_group("specimen", _specimen, *_SPECIMEN_OPTIONS)
+
+
+def _pair(ctx: click.Context, param: click.Parameter, given: str | None) -> Any:
+    """The smallest and the largest pressure, with a colon between them."""
+    if given is None:
+        return None
+    ends = tuple(given.split(":"))
+    if len(ends) != 2:
+        raise InputError(f"--pressures must be like 0.1:100 or 1MPa:50MPa, got {given!r}")
+    return ends
+
+
+def _names(ctx: click.Context, param: click.Parameter, given: str | None) -> Any:
+    return None if given is None else given.split(",")
+
+
+# of files for other programs, of a surface (`mbma export`) or a joint (`mbma joint --export`)
+file_options = option_group(
+    "asked",
+    given_values,
+    click.option(
+        "--pressures",
+        metavar="X:X",
+        callback=_pair,
+        help="Smallest and largest pressure: where the error holds, and the rows end.",
+    ),
+    click.option(
+        "--name",
+        help="Of the interaction, table, functions or module; else in the comments.",
+    ),
+    click.option(
+        "--quantity",
+        metavar="NAME[,NAME]",
+        callback=_names,
+        help="Of the rows, else the usual one; several for lsdyna, getdp, moose-function.",
+    ),
+    click.option("--rows", type=int, help="Number of rows; else as few as --rtol needs."),
+    click.option(
+        "--rtol",
+        type=float,
+        help="Largest relative error of linear interpolation; 1e-3 by default.",
+    ),
+    quantity_option(
+        "--friction-pressure",
+        help="At which a friction card's stiffness holds; else amid --pressures.",
+    ),
+    click.option(
+        "--leakage",
+        is_flag=True,
+        default=None,
+        help="Flow coefficient of the gaps: rows of it alone, laws as code with it.",
+    ),
+    click.option(
+        "--peklenik",
+        type=float,
+        help="Of a film: length of the roughness along x over that along y.",
+    ),
+    click.option(
+        "--binaries",
+        type=click.Choice(["here", "all", "none"]),
+        help="In an FMU: for this platform, for all by zig, or none.",
+    ),
+)
 # None where none of them is given
 optional_specimen_options = option_group(
     "specimen",

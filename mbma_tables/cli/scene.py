@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
+from mbma_tables.cli.export import write_first
 from mbma_tables.cli.format import Report, assumption_notes, columns_of, to_json
 from mbma_tables.cli.options import (
     Output,
     check_plot,
+    file_options,
     given_values,
     json_option,
     numbers_option,
@@ -24,6 +26,7 @@ from mbma_tables.cli.options import (
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import MAX_BYTES, read_file, write_file, written_bytes
 from mbma_tables.common.progress import echo
+from mbma_tables.export.targets import targets
 from mbma_tables.export.text import written_by
 from mbma_tables.surfaces.surface import assumptions
 
@@ -119,28 +122,21 @@ def _export_joint(file: Path, out: Path, target: str, **options: Any) -> None:
     """Write the joint of a file for another program."""
     from mbma_tables.joint import Joint
 
-    if "pressures" in options:
-        ends = options["pressures"].split(":")
-        if len(ends) != 2:
-            raise InputError(
-                f"--pressures must be like 1MPa:50MPa, got {options['pressures']!r}"
-            )
-        options["pressures"] = tuple(ends)
-    if "quantity" in options:
-        options["quantity"] = options["quantity"].split(",")
     digest = hashlib.sha256(read_file(file, MAX_BYTES)).hexdigest()
     command = written_by(click.get_current_context().obj[1:], "joint")
-    made_by = f"input {file}: sha256 {digest}", command
+    options["made_by"] = f"input {file}: sha256 {digest}", command
     joint = Joint.from_toml(file)
     if str(out) == "-":
-        content = joint.export(target, **options, made_by=made_by)
-        write_file(out, content.encode() if isinstance(content, str) else bytes(content))  # type: ignore[arg-type]
+        first = joint.export(target, **options)
+        assert isinstance(first, str | bytes)
+        content = first.encode() if isinstance(first, str) else first
+        write_first(targets()[target], content)
         return
-    for path in joint.export(target, **options, path=out, made_by=made_by):
+    for path in joint.export(target, **options, path=out):
         echo(path)
 
 
-_export_options = option_group(
+_joint_options = option_group(
     "export",
     given_values,
     click.option(
@@ -150,47 +146,11 @@ _export_options = option_group(
         help="Write for another program: a target of `mbma export`.",
     ),
     click.option(
-        "--pressures",
-        metavar="X:X",
-        help="Of --export: smallest and largest pressure, such as 1MPa:50MPa.",
-    ),
-    click.option("--name", help="Of the interaction, table, functions or module."),
-    click.option(
-        "--quantity",
-        metavar="NAME[,NAME]",
-        help="Of the rows; several for lsdyna, getdp, moose-function.",
-    ),
-    click.option("--rows", type=int, help="Number of rows; else as few as --rtol needs."),
-    click.option(
-        "--rtol",
-        type=float,
-        help="Largest relative error of linear interpolation; 1e-3 by default.",
-    ),
-    click.option(
         "--without-heat",
         "heat",
         flag_value=False,
         default=None,
         help="Leave conductance out.",
-    ),
-    click.option(
-        "--friction-pressure",
-        metavar="X[UNIT]",
-        help="At which a friction card's stiffness holds.",
-    ),
-    click.option(
-        "--leakage",
-        is_flag=True,
-        default=None,
-        help="Functions with the flow coefficient of the gaps.",
-    ),
-    click.option(
-        "--peklenik",
-        type=float,
-        help="Of a film: length of the roughness along x over that along y.",
-    ),
-    click.option(
-        "--binaries", type=click.Choice(["here", "all", "none"]), help="Of an FMU."
     ),
     click.option("--length-unit", metavar="UNIT", help="Of the file; mm by default."),
     click.option("--stress-unit", metavar="UNIT", help="Of the file; MPa by default."),
@@ -211,7 +171,8 @@ _export_options = option_group(
     help="In place of pressures: 40kN, on nominal_area.",
 )
 @plot_option
-@_export_options
+@_joint_options
+@file_options
 @output_options
 def joint_command(
     file: Path,
@@ -220,6 +181,7 @@ def joint_command(
     plot: Path | None,
     output: Output,
     export: dict[str, Any],
+    asked: dict[str, Any],
 ) -> None:
     """Interface laws of the joint in FILE (TOML: bodies, nominal_area, part_a, part_b) at pressures.
 
@@ -231,6 +193,7 @@ def joint_command(
     Example: mbma joint examples/joint.toml --export abaqus --pressures 1MPa:50MPa --name
     JOINT --out joint.inp
     """
+    export |= asked
     if "target" in export:
         if pressure or force or plot is not None or output.as_json or output.as_csv:
             raise InputError(

@@ -157,5 +157,11 @@ _WRITE = {
 }
 TARGETS = (
     *(Target(name, write, quantities=tuple(AGAINST)) for name, write in _WRITE.items()),
-    Target("matlab", _matlab_files, end=".mat", quantities=tuple(AGAINST)),
+    Target(
+        "matlab",
+        _matlab_files,
+        end=".mat",
+        quantities=tuple(AGAINST),
+        beside=(".m",),
+    ),
 )

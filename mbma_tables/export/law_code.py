@@ -262,6 +262,7 @@ def _target(name: str, language: Language) -> Target:
         CODE - {"leakage"} if language.subroutine else CODE,
         rows=False,
         alone=language.alone,
+        beside=tuple(file.end for file in language.beside),
     )
 
 

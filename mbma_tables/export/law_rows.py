@@ -277,11 +277,11 @@ def _friction(
     ends = [
         float(units.number("pressure", p)) for p in (pressures or (pressure, pressure))
     ]
-    at = (
-        float(units.number("pressure", pressure))
-        if pressure is not None
-        else math.sqrt(math.prod(ends))
-    )
+    at = math.sqrt(math.prod(ends))
+    if pressure is not None:
+        at = number_in(
+            "friction_pressure", units.number("pressure", pressure), 1e-300, 1e300
+        )
     ratio = number_in(
         "kappa",
         kappa(float(law.at_pressure(at).area)) if callable(kappa) else kappa,

@@ -8,13 +8,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from mbma_tables import __version__
-from mbma_tables.common.arguments import nearest
+from mbma_tables.common.arguments import nearest, require_flag, require_name
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor
 from mbma_tables.export.exported_law import GasInGaps
 from mbma_tables.export.languages import LANGUAGES
 from mbma_tables.export.law_rows import describe_law
-from mbma_tables.export.targets import Target, targets
+from mbma_tables.export.targets import AGAINST, Target, targets
 from mbma_tables.quantities.gas import VACUUM
 from mbma_tables.quantities.interface import Gas
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -44,99 +44,123 @@ def joint_files(
     out: pathlib.Path | None = None,
     pressures: Any = None,
     name: str | None = None,
-    heat: bool = True,
+    heat: bool | None = None,
     friction_pressure: float | str | None = None,
     quantity: str | Sequence[str] | None = None,
     length_unit: str | None = None,
     stress_unit: str | None = None,
+    leakage: bool = False,
     made_by: tuple[str, ...] = (),
     **options: Any,
 ) -> Mapping[str, bytes]:
     """The files of a target by the ends of their names, as `Joint.export` describes them.
 
-    Options of some targets alone, such as `rows` or `leakage`, are refused by name where
+    Options of some targets alone, such as `rows` or `binaries`, are refused by name where
     others get them.
     """
     program = _target_of_laws(target)
     units = _units(program, length_unit, stress_unit)
-    given = {key: value for key, value in options.items() if value not in (None, False)}
+    require_flag("leakage", leakage)
+    if heat is not None:
+        require_flag("heat", heat)
+    given = {key: value for key, value in options.items() if value is not None}
+    if leakage:
+        given["leakage"] = leakage
     _refuse(target, [key for key in given if key not in program.takes])
-    shared = {"theory": joint.theory, "hardness": joint.hardness, **units, **given}
-    made_by = made_by or (
-        f"written from Python by mbma_tables {__version__}: a joint for {target}",
-    )
-    if name is not None and "name" not in program.takes and not program.end:
-        # the format has no place for it but the comments
-        made_by = (f"name: {name}", *made_by)
-    named = (
-        {"name": name}
-        if name is not None and ("name" in program.takes or program.end)
-        else {}
-    )
-    if program.end:
-        # what belongs together is found by the file's name
-        if out is not None and out.suffix != program.end:
-            raise InputError(
-                f"the path of {target} must be NAME{program.end}, got {out.name!r}"
-            )
-        if out is not None and name not in (None, out.stem):
-            raise InputError(
-                f"{target} is called by the name of its file, {out.stem!r}: leave name out, got {name!r}"
-            )
-        named = {"name": name or ("joint" if out is None else out.stem)}
     if out is None and not program.alone:
         raise InputError(
             f"{target} is several files, of which the first needs the others: give path"
         )
-    shared["made_by"] = made_by
-    if not program.rows:
-        _refuse(
-            target,
-            [
-                key
-                for key, value in {"pressures": pressures, "quantity": quantity}.items()
-                if value
-            ],
-        )
-        _refuse(target, ["friction_pressure"] if friction_pressure is not None else [])
-        language = LANGUAGES.get(target)
-        if language and language.frictionless and joint.friction is not None:
-            note = f"the joint's friction, {joint.friction:g}, is left out: the faces slide freely"
-            shared["made_by"] = (note, *made_by)
-        return program.files(
-            joint.surface,
-            joint.E_star,
-            **_of_code(joint, target, units, heat),
-            **shared,
-            **named,
-        )
-    wanted = (
-        [quantity]
-        if isinstance(quantity, str)
-        else list(quantity or [_usual(program, heat)])
-    )
-    if len(wanted) > 1 and not program.several:
-        raise InputError(f"{target} has one quantity a file: give one of {wanted}")
-    if pressures is None and wanted != ["film"]:
-        raise InputError(
-            f"{target} needs pressures, the smallest and the largest, such as ('1 MPa', '50 MPa')"
-        )
+    named, line_of_name = program.place_of_name(name, out)
+    shared = {"theory": joint.theory, "hardness": joint.hardness, **units, **given}
+    shared["made_by"] = (*line_of_name, *_made_by(target, made_by))
+    for_rows = {
+        "pressures": pressures,
+        "quantity": quantity,
+        "friction_pressure": friction_pressure,
+    }
+    if program.rows:
+        return program.files(_all_rows(joint, program, heat, shared, **for_rows), **named)
+    _refuse(target, [key for key, value in for_rows.items() if value is not None])
+    shared |= _of_code(joint, target, units, heat)
+    return program.files(joint.surface, joint.E_star, **shared, **named)
+
+
+def _made_by(target: str, lines: Any) -> tuple[str, ...]:
+    """Lines of the header on how the file was made."""
+    if isinstance(lines, str) or not isinstance(lines, Sequence):
+        raise InputError(f"made_by must be lines of text, got {lines!r}")
+    for line in lines:
+        if not isinstance(line, str):
+            raise InputError(f"made_by must be lines of text, got {line!r} among them")
+    by_default = f"written from Python by mbma_tables {__version__}: a joint for {target}"
+    return tuple(lines) or (by_default,)
+
+
+def _all_rows(
+    joint: ExportedJoint,
+    program: Target,
+    heat: bool | None,
+    shared: dict[str, Any],
+    pressures: Any,
+    quantity: str | Sequence[str] | None,
+    friction_pressure: float | str | None,
+) -> Any:
+    """Rows of one quantity, or a list of those of several."""
+    leakage = shared.pop("leakage", False)
+    wanted = _quantities(program, quantity, leakage, heat)
     if pressures is not None:
         shared["pressures"] = pressures
+    elif wanted != ["film"]:
+        raise InputError(
+            f"{program.name} needs pressures, the smallest and the largest, such as ('1 MPa', '50 MPa')"
+        )
     rubbed = joint.friction is not None and "friction" in program.takes
     if rubbed:
         shared |= {"friction": joint.friction, "friction_pressure": friction_pressure}
     elif friction_pressure is not None:
-        _refuse(target, ["friction_pressure"])
-    laws = [_rows(joint, program, one, units, shared, rubbed) for one in wanted]
-    return program.files(laws[0] if len(laws) == 1 else laws, **named)
+        _refuse(program.name, ["friction_pressure"])
+    laws = [_rows(joint, program, one, shared, rubbed) for one in wanted]
+    return laws[0] if len(laws) == 1 else laws
 
 
-def _target_of_laws(target: str) -> Target:
+def _quantities(
+    program: Target,
+    quantity: str | Sequence[str] | None,
+    leakage: bool,
+    heat: bool | None,
+) -> list[str]:
+    """Names of the quantities of rows: those asked for, else the usual one of the program."""
+    if quantity is None:
+        return ["leakage"] if leakage else [_usual(program, heat)]
+    if leakage:
+        raise InputError("quantity and leakage are both given: give quantity='leakage'")
+    names = [quantity] if isinstance(quantity, str) else quantity
+    if not isinstance(names, Sequence) or not names:
+        raise InputError(f"quantity must be a name or several, got {quantity!r}")
+    for name in names:
+        if not isinstance(name, str):
+            raise InputError(f"quantity must be a name or several, got {quantity!r}")
+        require_name("quantity of rows", name, AGAINST)
+    if len(set(names)) < len(names):
+        raise InputError(f"quantity has the same name twice: {quantity!r}")
+    if len(names) > 1 and not program.several:
+        raise InputError(
+            f"{program.name} has one quantity a file: give one of {list(names)}"
+        )
+    return list(names)
+
+
+def _target_of_laws(target: Any) -> Target:
     """The target of this name, unless it is the whole model."""
-    of_laws = {
-        key: each for key, each in targets().items() if each.rows or "kappa" in each.takes
-    }
+    of_laws = {key: each for key, each in targets().items() if "theory" in each.takes}
+    if not isinstance(target, str):
+        raise InputError(f"target must be the name of one, such as 'csv', got {target!r}")
+    if target in targets() and target not in of_laws:
+        raise InputError(
+            f"target {target!r} is the whole model, without any joint: `mbma export {target}` writes it; "
+            "the law of a joint in C is target 'c-law'"
+        )
     if target not in of_laws:
         raise InputError(
             f"no target of laws is called {target!r}: {nearest(target, of_laws)}"
@@ -146,11 +170,14 @@ def _target_of_laws(target: str) -> Target:
 
 def _units(program: Target, length: str | None, stress: str | None) -> dict[str, str]:
     """Units of length and stress: those asked for, those that the program prescribes, or mm and MPa."""
-    prescribed = program.units or (length or "mm", stress or "MPa")
-    asked = (length or prescribed[0], stress or prescribed[1])
-    if asked != prescribed:
+    prescribed = program.units or ("mm", "MPa")
+    asked = (
+        prescribed[0] if length is None else length,
+        prescribed[1] if stress is None else stress,
+    )
+    if program.units is not None and asked != prescribed:
         raise InputError(
-            f"{program.name} is written in {' and '.join(prescribed)}, got {' and '.join(asked)}"
+            f"{program.name} is written in {' and '.join(prescribed)}, got {' and '.join(map(str, asked))}"
         )
     return {"length_unit": asked[0], "stress_unit": asked[1]}
 
@@ -160,9 +187,9 @@ def _refuse(target: str, names: list[str]) -> None:
         raise InputError(f"without effect on {target}: leave {' and '.join(names)} out")
 
 
-def _usual(program: Target, heat: bool) -> str:
+def _usual(program: Target, heat: bool | None) -> str:
     """The quantity of rows where none is asked for: conductance, or what the program takes."""
-    if heat and "conductance" in program.quantities:
+    if heat is not False and "conductance" in program.quantities:
         return "conductance"
     return program.quantity
 
@@ -191,7 +218,6 @@ def _rows(
     joint: ExportedJoint,
     program: Target,
     quantity: str,
-    units: Mapping[str, str],
     shared: Mapping[str, Any],
     rubbed: bool,
 ) -> Any:
@@ -200,7 +226,7 @@ def _rows(
     if program.most:
         asked["most_rows"] = program.most.get(quantity)
     if quantity == "conductance":
-        heat, unit = _conductivity(joint, units)
+        heat, unit = _conductivity(joint, shared)
         asked |= heat
         gas = GasInGaps(joint.gas, unit)
         if program.conducts_gas:
@@ -211,34 +237,67 @@ def _rows(
 
 
 def _of_code(
-    joint: ExportedJoint, target: str, units: Mapping[str, str], heat: bool
+    joint: ExportedJoint, target: str, units: Mapping[str, str], heat: bool | None
 ) -> dict[str, Any]:
-    """Arguments of a law as code: the stiffness before slip, and with `heat` conductance, as far as it has them."""
+    """Arguments of a law as code, with what the joint has; comments name what is left out."""
     language = LANGUAGES.get(target)
+    notes: list[str] = []
+    if language and language.frictionless and joint.friction is not None:
+        notes.append(
+            f"the joint's friction, {joint.friction:g}, is left out: the faces slide freely"
+        )
+    arguments: dict[str, Any] = {}
     if language and not language.unloads and not _is_infinite(joint.hardness):
-        note = (
+        notes.append(
             "without conductance and tangential stiffness, which follow the unloading stiffness of contact that "
             "yields: c-law, fortran-law, javascript-law, modelica-law, an FMU and rows have them"
         )
-        return {"notes": (note,)}
-    arguments: dict[str, Any] = {}
-    if joint.kappa_varies:
-        arguments["notes"] = (
-            "without tangential stiffness, whose ratio varies with the area: rows have it",
-        )
     else:
-        arguments["kappa"] = float(joint.kappa(None))
-    if heat:
-        if language and language.subroutine and joint.gas.name != VACUUM:
-            raise InputError(
-                f"{target} has the conductance of the solid spots alone, without that of {joint.gas.name} in the gaps: "
-                "take rows, which have both, such as target 'abaqus' or 'calculix', or a joint with gas='vacuum'; "
-                "heat=False leaves conductance out"
-            )
-        conductivity, unit = _conductivity(joint, units)
-        arguments |= conductivity
-        arguments["gas"] = GasInGaps(joint.gas, unit)
-    return arguments
+        arguments |= _stiffness_before_slip(joint, notes)
+        arguments |= _heat_of_code(joint, target, units, heat, notes)
+    return {**arguments, "notes": tuple(notes)}
+
+
+def _stiffness_before_slip(joint: ExportedJoint, notes: list[str]) -> dict[str, Any]:
+    """The ratio of stiffnesses of a law as code, or a note that it is left out."""
+    if joint.kappa_varies:
+        notes.append(
+            "without tangential stiffness, whose ratio varies with the area: rows have it"
+        )
+        return {}
+    try:
+        return {"kappa": float(joint.kappa(None))}
+    except InputError as fault:
+        # of bodies without Poisson's ratio, and of a lay without a direction
+        notes.append(f"without tangential stiffness: {fault}")
+        return {}
+
+
+def _heat_of_code(
+    joint: ExportedJoint,
+    target: str,
+    units: Mapping[str, str],
+    heat: bool | None,
+    notes: list[str],
+) -> dict[str, Any]:
+    """The conductivity of a law as code, and its gas; or a note that conductance is left out."""
+    language = LANGUAGES.get(target)
+    alone = language is not None and language.conductance_alone
+    if heat is False:
+        if alone:
+            raise InputError(f"{target} is of conductance alone: leave heat out")
+        return {}
+    if heat is None and joint.conductivity is None and not alone:
+        notes.append("without conductance: the bodies have no thermal conductivity")
+        return {}
+    if language and language.subroutine and joint.gas.name != VACUUM:
+        raise InputError(
+            f"{target} has the conductance of the solid spots alone, without that of {joint.gas.name} in the gaps: "
+            "take rows, which have both, such as target 'abaqus' or 'calculix', or a joint with gas='vacuum'; "
+            "heat=False leaves conductance out"
+        )
+    conductivity, unit = _conductivity(joint, units)
+    return conductivity | {"gas": GasInGaps(joint.gas, unit)}
 
 
 def _is_infinite(hardness: float | str) -> bool:

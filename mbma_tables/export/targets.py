@@ -72,6 +72,38 @@ class Target:
         True  # whether conductance may be that of solid spots and gas together
     )
     alone: bool = True  # whether the first file can be used without those beside it
+    beside: tuple[str, ...] = ()  # ends of the names of other files
+
+    def place_of_name(
+        self, name: str | None, out: pathlib.Path | None
+    ) -> tuple[dict[str, str], tuple[str, ...]]:
+        """Where a name stands: the argument of `write`, or else a line of the comments.
+
+        Raises
+        ------
+        InputError
+            Where the functions are called by the name of the file `out`, which has another
+            end, or another name is asked for.
+        """
+        if not self.end:
+            if name is None:
+                return {}, ()
+            if "name" in self.takes:
+                return {"name": name}, ()
+            if not isinstance(name, str):
+                raise InputError(f"a name must be text, got {name!r}")
+            return {}, (f"name: {name}",)
+        if out is None:
+            return {"name": "joint" if name is None else name}, ()
+        if out.suffix != self.end:
+            raise InputError(
+                f"the path of {self.name} must be NAME{self.end}, got {out.name!r}"
+            )
+        if name not in (None, out.stem):
+            raise InputError(
+                f"{self.name} is called by the name of its file, {out.stem!r}: leave name out, got {name!r}"
+            )
+        return {"name": out.stem}, ()
 
     def files(self, *given: Any, **options: Any) -> Mapping[str, bytes]:
         """The files by the ends of their names, that of the first being ""."""

@@ -230,7 +230,7 @@ def rough_contact(
     """
     if shape not in SHAPES:
         raise InputError(
-            f"shape must be one of {SHAPES}, got {shape!r}{nearest(str(shape), SHAPES)}"
+            f"shape must be one of {SHAPES}, got {shape!r}; {nearest(str(shape), SHAPES)}"
         )
     law = contact_law(surface, bodies, theory, rtol=LAYER_RTOL)
     units = law.units

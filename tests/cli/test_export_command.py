@@ -207,6 +207,8 @@ def test_an_option_without_effect_is_refused(target, tmp_path):
         if (
             f"--{option}" not in ANY
             or option.replace("-", "_") in targets()[target].takes
+            # formats without names have it in their comments
+            or (option == "name" and target not in CODE)
         ):
             continue
         result = run(

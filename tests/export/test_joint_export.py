@@ -3,6 +3,7 @@
 import dataclasses
 import io
 import json
+import math
 import pathlib
 import re
 import subprocess
@@ -15,7 +16,7 @@ from law_points import needs
 from test_fields import GETDP, MESH
 from test_programs import TOP, calculix, conductance, each, heated
 
-from mbma_tables import InputError, Joint
+from mbma_tables import Bodies, InputError, Joint
 from mbma_tables.cli import main
 from mbma_tables.export.targets import targets
 from mbma_tables.export.text import number
@@ -311,7 +312,7 @@ def test_the_command_writes_a_joint(tmp_path):
         (("--export", "abaqus", "--out", "-"), "abaqus needs pressures"),
         (
             ("--export", "abaqus", "--pressures", "1MPa", "--out", "-"),
-            "--pressures must be like 1MPa:50MPa",
+            "--pressures must be like 0.1:100 or 1MPa:50MPa",
         ),
         (("--export", "abacus", "--out", "-"), "no target of laws is called 'abacus'"),
         (
@@ -346,3 +347,101 @@ def test_export_of_a_joints_file_names_the_command_that_writes_it():
     )
     assert done.exit_code != 0
     assert f"mbma joint {EXAMPLE} --export TARGET" in str(done.exception) + done.output
+
+
+@pytest.mark.parametrize(
+    ("target", "options", "message"),
+    [
+        ("c", {}, "'c' is the whole model.*c-law"),
+        (None, {}, "target must be the name of one"),
+        (["csv"], {}, "target must be the name of one"),
+        ("abaqus", {"friction_pressure": 0}, "friction_pressure must be"),
+        ("abaqus", {"friction_pressure": [1, 2]}, "friction_pressure must be"),
+        ("abaqus", {"rows": 0}, "rows must be a whole number"),
+        ("abaqus", {"rtol": 0}, "rtol must be a number in"),
+        ("c-law", {"rtol": 0}, "without effect on c-law: leave rtol out"),
+        ("abaqus", {"length_unit": ""}, "unit of length"),
+        ("csv", {"quantity": 3}, "quantity must be a name or several, got 3"),
+        ("csv", {"quantity": []}, "quantity must be a name or several"),
+        ("csv", {"quantity": [3]}, "quantity must be a name or several"),
+        ("csv", {"quantity": "presure"}, "did you mean 'pressure'"),
+        ("getdp", {"quantity": ["pressure"] * 2}, "the same name twice"),
+        ("getdp", {"quantity": "film", "leakage": True}, "give quantity='leakage'"),
+        ("c-law", {"quantity": []}, "without effect on c-law: leave quantity out"),
+        ("csv", {"heat": "no"}, "heat must be True or False, got 'no'"),
+        ("csv", {"name": 3}, "a name must be text, got 3"),
+        ("csv", {"leakage": math.nan}, "leakage must be True or False, got nan"),
+        ("c-law", {"leakage": "no"}, "leakage must be True or False, got 'no'"),
+        ("csv", {"made_by": "me"}, "made_by must be lines of text"),
+        ("csv", {"made_by": 3}, "made_by must be lines of text"),
+        ("csv", {"made_by": (3,)}, "made_by must be lines of text"),
+        ("csv", {"path": 3}, "path must be that of a file, got 3"),
+        ("calculix-gapcon", {"heat": False}, "is of conductance alone"),
+    ],
+)
+def test_what_an_export_refuses(joint, target, options, message):
+    rows = target in targets() and targets()[target].rows if target != ["csv"] else True
+    with pytest.raises(InputError, match=message):
+        joint.export(target, SPAN if rows else None, **options)
+
+
+def test_rows_of_leakage_by_the_option_are_those_by_the_quantity(joint):
+    options = {"made_by": ("test",), "rtol": 1e-2}
+    by_option = joint.export("csv", SPAN, leakage=True, **options)
+    assert by_option == joint.export("csv", SPAN, quantity="leakage", **options)
+    assert "leakage [mm^3]" in by_option
+
+
+@pytest.mark.parametrize("target", [name for name in OF_LAWS if "law" in name])
+def test_code_leaves_out_what_the_bodies_do_not_know(target, tmp_path):
+    """Bodies of a modulus alone: no law was written as code, even without heat."""
+    unknown = Joint(
+        FACE, bodies=Bodies("100 GPa"), nominal_area="4 cm^2", theory="calibrated"
+    )
+    path = tmp_path / "bolt.txt"
+    unknown.export(target, name="bolt", path=path)
+    # comments wrap, and each line begins with a mark
+    text = " ".join(re.sub(r"\n *(?:\*|#|!|%|//)", " ", path.read_text()).split())
+    assert "without tangential stiffness: tangential stiffness needs nu" in text
+    assert "without conductance: the bodies have no thermal conductivity" in text
+    assert "tangential_stiffness(" not in text
+    with pytest.raises(InputError, match="conductance needs the thermal conductivity"):
+        unknown.export(target, path=path, heat=True)
+
+
+def test_standard_output_names_the_files_that_it_leaves_out():
+    done = run("--export", "c-law", "--out", "-")
+    assert done.exit_code == 0, done.output
+    assert done.stderr == "left out: NAME.h; --out FILE writes all\n"
+    surface = ["--surface", "concrete", "--E-star", "13.3MPa", "--theory", "calibrated"]
+    for words in (
+        ["joint", str(EXAMPLE), "--export", "fortran-law"],
+        ["export", "fortran-law", *surface],
+    ):
+        done = CliRunner().invoke(main, [*words, "--out", "-"])
+        assert done.exit_code == 2
+        assert "fortran-law is several files" in done.output
+        assert done.stdout == ""
+
+
+def test_both_commands_take_the_same_options_of_files(tmp_path):
+    """A name was refused for lsdyna by one command, and a comment by the other."""
+    surface = ["--surface", "concrete", "--E-star", "13.3MPa"]
+    words = ["export", "lsdyna", *surface, "--name", "ROAD", "--rows", "20", "--out", "-"]
+    done = CliRunner().invoke(main, words)
+    assert done.exit_code == 0, done.output
+    assert "$ name: ROAD\n" in done.output
+    two = ["--quantity", "pressure,leakage", "--theory", "calibrated", "--rtol", "0.01"]
+    done = CliRunner().invoke(main, ["export", "getdp", *surface, *two, "--out", "-"])
+    assert done.exit_code == 0, done.output
+    assert "rough_pressure[] =" in done.output
+    assert "rough_leakage[] =" in done.output
+    commands = [main.commands["export"], main.commands["joint"]]
+    shared = [{each.name: each.help for each in one.params} for one in commands]
+    names = shared[0].keys() & shared[1].keys() - {"out", "help"}
+    assert {"pressures", "rows", "quantity", "binaries"} <= names
+    file_options = {
+        "pressures", "name", "quantity", "rows", "rtol", "friction_pressure", "leakage",
+        "peklenik", "binaries",
+    }  # fmt: skip
+    assert all(shared[0][name] == shared[1][name] for name in file_options)
