@@ -8,13 +8,12 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import (
-    FEW_LOOKS,
-    Curve,
     Theory,
     TheoryAnswer,
     UserTheory,
     select,
 )
+from mbma_tables.theories.inversion import FEW_LOOKS, Curve
 
 ENOUGH = 2e-8  # relative error of stiffnesses
 

@@ -257,7 +257,7 @@ def test_an_interval_binds_contacts_and_laws():
             with pytest.raises(OutOfRangeError) as caught:
                 ask([2.0, beyond])
             assert np.array_equal(caught.value.mask, [False, True])
-    with pytest.raises(OutOfRangeError, match=r"is defined, u from 1\.5 to 2\.7"):
+    with pytest.raises(OutOfRangeError, match=r"is defined, u at least 1\.5"):
         contact(FACE, separation=-1.0, theory=Partial())
     with pytest.raises(OutOfRangeError, match="partial"):
         contact(FACE, pressure=0.9, theory=Partial())

@@ -14,7 +14,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.spectral import PRESSED
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories import tested
-from mbma_tables.theories.base import Curve, Theory, TheoryAnswer, unfinished
+from mbma_tables.theories.base import Theory, TheoryAnswer, unfinished
 from mbma_tables.theories.calibrated import table as calibrated_table
 from mbma_tables.theories.calibrated.formulas import (
     KEPT,
@@ -25,6 +25,7 @@ from mbma_tables.theories.calibrated.formulas import (
 )
 from mbma_tables.theories.calibrated.formulas import area as law_area
 from mbma_tables.theories.evidence import shipped_deviations
+from mbma_tables.theories.inversion import Curve
 from mbma_tables.theories.tested import TESTED_AREA
 
 if TYPE_CHECKING:

@@ -14,12 +14,12 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories.base import (
     Compression,
-    Curve,
     Theory,
     TheoryAnswer,
     curve_values,
     select,
 )
+from mbma_tables.theories.inversion import Curve
 from mbma_tables.theories.mbma.geometry import kinks
 from mbma_tables.theories.mbma.island import check_band
 from mbma_tables.theories.mbma.island_models import (

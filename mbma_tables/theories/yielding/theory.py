@@ -14,8 +14,9 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories.base import FEW_LOOKS, Curve, Theory, TheoryAnswer, unfinished
+from mbma_tables.theories.base import Theory, TheoryAnswer, unfinished
 from mbma_tables.theories.evidence import known_at, shipped_part
+from mbma_tables.theories.inversion import FEW_LOOKS, Curve
 from mbma_tables.theories.yielding import formulas as law
 
 GROUP = "hardness"  # group of the calibrated laws' file
