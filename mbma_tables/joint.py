@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.bodies import Bodies, BodiesInUnits
 from mbma_tables.common.arguments import (
-    checked_hardness,
     hinted,
     one_number,
     positive_array,
@@ -43,7 +42,6 @@ from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import law_of
 from mbma_tables.materials import Pair, effective_modulus
 from mbma_tables.quantities import registry
-from mbma_tables.quantities.gas import checked_gas
 from mbma_tables.quantities.interface import Gas, Interface
 from mbma_tables.quantities.properties import JointQuantities
 from mbma_tables.quantities.tangential import (
@@ -87,15 +85,6 @@ def equivalent(faces: Sequence[Any], nominal_area: Any) -> AnySurface:
     return surface
 
 
-def _gas(gas: Any) -> Gas:
-    """A gas by its name, as it is, or of its arguments by name, as files have them."""
-    if isinstance(gas, Gas):
-        return gas
-    if isinstance(gas, Mapping):
-        return Gas(**gas)
-    return Gas(gas)
-
-
 def _relative_scatter(pressed: Contact, name: str) -> Any:
     """Standard deviation of ln(quantity), as pictures draw it; None of quantities without one."""
     if registry.get(name).uncertainty is None:
@@ -115,11 +104,13 @@ class Joint(JointQuantities, Displayed):
         numbers); the arguments of `Surface.from_roughness` without a highest point; or
         those of `Surface.from_map`, with the file under "map". Without `part_b` the other
         face is smooth.
-    bodies : str, Metal, pair of them, or Bodies
+    bodies : str, Metal, pair of them, float, or Bodies
         Metals of the parts, from `mbma_tables.materials.METALS`, or the arguments of
         `materials.Metal` by name; one if both are the same. Or `Bodies`, with the hardness
         of the softer metal, as for `contact`: by default it is that of the metals, whose
-        temper must then be named.
+        temper must then be named. Or the effective modulus, "58 GPa"; a plain number is in
+        GPa. Plain pressures, here and in every method but `export`, are in the unit of the
+        modulus, GPa for metals.
     nominal_area : float or str, optional
         A0 [length^2], from which the highest point of Gaussian heights follows (`Surface`);
         needed for parts that are mappings. Without it, surfaces keep their own highest
@@ -191,8 +182,10 @@ class Joint(JointQuantities, Displayed):
                 f"a joint is of one surface, got a batch of shape {surface.shape}"
             )
         object.__setattr__(self, "surface", surface)
-        object.__setattr__(self, "bodies", Bodies.of(self.bodies))
-        interface = Interface(self.friction, self.direction, _gas(self.gas))
+        # from here on every route reads the modulus and the hardness with their unit
+        bodies = Bodies.of(self.bodies).with_stress_unit("GPa")
+        object.__setattr__(self, "bodies", bodies)
+        interface = Interface(self.friction, self.direction, Gas.of(self.gas))
         object.__setattr__(self, "interface", interface)
         self._check()
 
@@ -204,8 +197,8 @@ class Joint(JointQuantities, Displayed):
 
     @property
     def _in_units(self) -> BodiesInUnits:
-        """The bodies as numbers; stresses are in GPa where the modulus has no unit."""
-        in_units: BodiesInUnits = self.bodies.in_units(self.surface, "GPa")
+        """The bodies as numbers."""
+        in_units: BodiesInUnits = self.bodies.in_units(self.surface)
         return in_units
 
     def _face(self, name: str, part: Any) -> AnySurface:
@@ -237,15 +230,14 @@ class Joint(JointQuantities, Displayed):
         """Refuse at once what single results would refuse."""
         gas = self.interface.gas
         assert gas is not None
-        pressure = Units(stress="Pa").number("gas_pressure", gas.pressure)
-        checked_gas(gas.name, gas.temperature, pressure)
+        one_number("temperature", gas.temperature)
+        one_number("gas_pressure", gas.pascals)
+        one_number(
+            "accommodation", 1.0 if gas.accommodation is None else gas.accommodation
+        )
         checked_friction(self.friction)
         checked_direction(self.direction, self.surface)
-        number = checked_hardness(self._in_units.hardness)
-        if number.ndim:
-            raise InputError(
-                f"hardness of a joint is one number, got shape {number.shape}"
-            )
+        self._in_units.require_one_conductivity()
         if isinstance(self.theory, str):
             require_name("theory", self.theory, (*THEORIES, *OF_MAPS))
             surface: Any = self.surface
@@ -311,7 +303,7 @@ class Joint(JointQuantities, Displayed):
         return force_over_area(force, self.nominal_area, self.surface.unit)
 
     def at_pressure(self, pressure: ArrayLike | str) -> Contact:
-        """The contact at pressures F/A0 ("10 MPa"; plain numbers in GPa), as of `contact`: each in first loading."""
+        """The contact at pressures F/A0 ("10 MPa"; plain numbers in the unit of the modulus), as of `contact`: each in first loading."""
         return contact_of(
             self.surface,
             self.bodies,
@@ -330,7 +322,7 @@ class Joint(JointQuantities, Displayed):
         Parameters
         ----------
         pressure : float or str
-            F/A0, held fixed; plain numbers in GPa.
+            F/A0, held fixed; plain numbers in the unit of the modulus.
 
         Returns
         -------
@@ -612,8 +604,8 @@ class Joint(JointQuantities, Displayed):
         path : str or path, optional
             File to save the figure to: "name.svg", .pdf, .png.
         pressures : pair of float or str, optional
-            Smallest and largest pressure, plain numbers in GPa; default: 1e-5 and 0.3 of
-            the softer metal's hardness.
+            Smallest and largest pressure, plain numbers in the unit of the modulus;
+            default: 1e-5 and 0.3 of the softer metal's hardness.
 
         Raises
         ------
@@ -626,11 +618,11 @@ class Joint(JointQuantities, Displayed):
             raise InputError(
                 f"pressures are the smallest and the largest, got {pressures!r}"
             )
+        units = self._in_units.units
         low, high = (
             float(
                 positive_array(
-                    "pressures",
-                    one_number("pressures", Units(stress="GPa").number("pressure", end)),
+                    "pressures", one_number("pressures", units.number("pressure", end))
                 )
             )
             for end in pressures
@@ -667,7 +659,7 @@ class Joint(JointQuantities, Displayed):
         facts["E_star"] = f"{float(in_units.E_star):.4g} {in_units.units.stress}"
         facts["hardness"] = "infinite" if hardness is None else str(hardness)
         facts["theory"] = chosen_theory(self.surface, self.theory).name
-        facts["gas"] = _gas(self.gas).name
+        facts["gas"] = Gas.of(self.gas).name
         facts["surface"] = repr(self.surface)
         assumed = assumptions(self.surface)
         if assumed:
@@ -703,8 +695,13 @@ class Joint(JointQuantities, Displayed):
         }
         lines = {}
         for label, names in panels.items():
-            # quantities whose needs were given
-            drawn = [name for name in names if name in variables]
+            # quantities whose needs were given; a logarithmic axis has no zeros, such as
+            # the conductance of a vacuum
+            drawn = [
+                name
+                for name in names
+                if name in variables and np.any(variables[name].values > 0)
+            ]
             if drawn:
                 lines[label] = [
                     (

@@ -13,6 +13,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import difflib
+import functools
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -307,16 +308,7 @@ def get(name: str) -> Metal:
     >>> materials.get("6061-T6").name, materials.get("Aluminum 6061").name
     ('aluminium 6061 hard', 'aluminium 6061')
     """
-    words = _words(str(name))
-    full_name = _NAMES.get(words)
-    if full_name is None:
-        # the last word may be the temper
-        for temper in TEMPERS:
-            rest = list(words)
-            if temper in rest:
-                rest.remove(temper)
-                plain = _NAMES.get(tuple(rest))
-                full_name = f"{plain} {temper}" if plain in _METALS else full_name
+    full_name = _full_name(str(name))
     if full_name is None:
         raise InputError(
             f"no metal is named {name!r}: give {_alike(str(name))}, perhaps with ' soft' "
@@ -327,6 +319,29 @@ def get(name: str) -> Metal:
         one = _METALS[plain].hardness[TEMPERS.index(temper)]
         return dataclasses.replace(_METALS[plain], name=full_name, hardness=(one, one))
     return _METALS[full_name]
+
+
+@functools.lru_cache(1024)
+def _full_name(name: str) -> str | None:
+    """The name in `METALS`, perhaps with a temper, that is meant by any name of a metal; None if it is none."""
+    words = _words(name)
+    full_name = _NAMES.get(words)
+    if full_name is not None:
+        return full_name
+    # one word may be the temper
+    for temper in TEMPERS:
+        rest = list(words)
+        if temper in rest:
+            rest.remove(temper)
+            plain = _NAMES.get(tuple(rest))
+            if plain in _METALS:
+                return f"{plain} {temper}"
+    return None
+
+
+def is_name(name: str) -> bool:
+    """Whether a text is a metal's name, in any spelling that `get` takes."""
+    return _full_name(name) is not None
 
 
 def _alike(name: str) -> str:
@@ -463,10 +478,9 @@ def hardness(given: str) -> str:
     text = str(given)
     if match := _SCALE.fullmatch(text):
         return f"{_pressure_of_number(float(match[1]), match[2], match[3], match[4]):.6g} GPa"
-    # a name such as 6061-T6 begins and ends with a digit, as a plain number does
+    # a name such as 6061-T6 begins with a digit; 1.4301 alone is a number here
     plain = text.strip().replace(".", "").isdigit()
-    named = text[-1:].isdigit() and not plain and _words(text) in _NAMES
-    if named or text[:1].isalpha():
+    if text.strip()[:1].isalpha() or (is_name(text) and not plain):
         try:
             pressure = pair(text).hardness
         except InputError as fault:

@@ -381,8 +381,8 @@ def test_effects_that_are_not_called_for_cost_nothing(joint, monkeypatch):
     [
         ({"gas": "nitrogn"}, "did you mean 'nitrogen'"),
         ({"gas": 5}, "no gas is named 5"),
-        ({"gas": Gas(temperature=3000)}, "temperature must be from 200 to 600 K"),
-        ({"gas": Gas(pressure="-1 atm")}, "gas_pressure must be positive"),
+        ({"gas": {"temperature": 3000}}, "temperature must be from 200 to 600 K"),
+        ({"gas": {"pressure": "-1 atm"}}, "gas_pressure must be positive"),
         ({"theory": "calibratd"}, "did you mean 'calibrated'"),
         ({"theory": "simulated"}, "is of one map"),
         ({"theory": 5}, "theory must be one of"),
@@ -556,3 +556,122 @@ def test_a_subroutine_without_friction_says_so():
         assert (note in " ".join(text.replace("\n *", " ").split())) == (
             friction is not None
         )
+
+
+def closures(joint):
+    """Overclosures [mm] and pressures [MPa] of a joint's card for Abaqus."""
+    card = joint.export("abaqus", ("0.1 MPa", "10 MPa"), heat=False)
+    rows = card.split("TABULAR\n")[1].splitlines()
+    numbers = [row.split(",")[:2] for row in rows if row and row[0] not in "*"]
+    pressure, closure = np.array(numbers, dtype=float).T
+    return closure, pressure
+
+
+@pytest.mark.parametrize("hardness", [None, 2.0])
+@pytest.mark.parametrize(
+    "modulus", [58, "58", "58 GPa", Bodies(58.0), {"E_star": 58}, Bodies("58 GPa")]
+)
+def test_a_plain_modulus_is_in_gigapascals_for_every_route(modulus, hardness, tmp_path):
+    described = {"nominal_area": "4 cm^2", "theory": "calibrated", "gas": "vacuum"}
+    bodies = dataclasses.replace(Bodies.of(modulus), hardness=hardness, nu=0.3)
+    joint = Joint(FACE, bodies=bodies, **described)
+    surface = Surface.from_roughness(**FACE, nominal_area="4 cm^2")
+    own = None if hardness is None else f"{hardness} GPa"
+    known = contact(
+        surface,
+        Bodies("58000 MPa", hardness=own, nu=0.3),
+        pressure="10 MPa",
+        theory="calibrated",
+    )
+    found = joint.at_pressure("10 MPa")
+    assert found.area == pytest.approx(known.area, rel=1e-12)
+    assert found.pressure == pytest.approx(0.01, rel=1e-12)
+    assert joint.facts()["E_star"] == "58 GPa"
+    assert joint.at_pressure(0.01).area == found.area
+    law = joint.law()
+    assert law.at_pressure("10 MPa").area == pytest.approx(known.area, rel=1e-6)
+    assert float(joint.table(["10 MPa"])["area"][0]) == found.area
+    assert joint.table([0.01])["pressure"].attrs["units"] == "GPa"
+    slopes = joint.sensitivity("10 MPa")
+    assert slopes.parameters["E_star"] == 58.0
+    assert slopes.answers["area"] == pytest.approx(known.area, rel=1e-9)
+    closure, pressure = closures(joint)
+    gaps = law.h_max - 1e3 * closure[1:]
+    # rows begin at the smallest pressure, which they leave out
+    rise = 1e3 * (law.pressure(gaps) - law.pressure(gaps[0]))
+    # the rows' own tolerance at either end
+    np.testing.assert_allclose(rise, pressure[1:] - pressure[1], rtol=2e-3)
+    picture = tmp_path / "joint.svg"
+    joint.plot(picture, pressures=(0.001, 0.01))
+    assert "[GPa]" in picture.read_text(encoding="utf-8")
+
+
+def test_a_modulus_of_a_file_is_in_gigapascals(tmp_path):
+    path = tmp_path / "joint.toml"
+    numbers = "".join(f"{name} = {value!r}\n" for name, value in FACE.items())
+    text = f'nominal_area = "4 cm^2"\ntheory = "calibrated"\n\n[part_a]\n{numbers}'
+    path.write_text(f"bodies = 57.53\n{text}", encoding="utf-8")
+    plain = Joint.from_toml(path)
+    path.write_text(f'bodies = "57530 MPa"\n{text}', encoding="utf-8")
+    named = Joint.from_toml(path)
+    for one, other in zip(closures(plain), closures(named), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9)
+    # plain pressures are in the unit that the modulus has
+    for joint, size in ((plain, 1e-3), (named, 1.0)):
+        area = joint.at_pressure("5 MPa").area
+        assert joint.at_pressure(5 * size).area == pytest.approx(area, rel=1e-12)
+        assert float(joint.table([5 * size])["area"][0]) == pytest.approx(area, rel=1e-12)
+        answers = joint.sensitivity(5 * size).answers
+        assert answers["area"] == pytest.approx(area, rel=1e-9)
+        drawn = joint.plot(pressures=(size, 50 * size))
+        ends = drawn.axes[0].lines[0].get_xdata()[[0, -1]]
+        np.testing.assert_allclose(ends, [size, 50 * size], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("typed", "name"),
+    [
+        ("1.4301", "stainless steel 304"), ("6061", "aluminium 6061"), ("3.3211", "aluminium 6061"),
+        ("6061-T6", "aluminium 6061 hard"), ("42CrMo4", "steel 4140"), ("7075 hard", "aluminium 7075 hard"),
+        (("1.4301", "6061-T6"), ("stainless steel 304", "aluminium 6061 hard")),
+        (["42CrMo4", "silver"], ("steel 4140", "silver")),
+    ],
+)  # fmt: skip
+def test_metals_whose_names_begin_with_a_digit(typed, name):
+    joint = Joint(FACE, bodies=typed, nominal_area="4 cm^2")
+    assert joint.pair == materials.pair(name)
+    surface = joint.surface
+    assert (
+        contact(surface, typed, pressure="1 MPa").area
+        == contact(surface, name, pressure="1 MPa").area
+    )
+
+
+@pytest.mark.parametrize(
+    ("changed", "match"),
+    [
+        ({"bodies": None}, "bodies are missing"),
+        ({"bodies": []}, "materials are one or two|is empty"),
+        ({"bodies": ("210 GPa", "70 GPa")}, r"one number, got shape \(2,\)"),
+        ({"bodies": Bodies([100.0, 200.0])}, r"one number, got shape \(2,\)"),
+        ({"bodies": {"E_star": 1, "x": 2}}, "no argument 'x'"),
+        ({"bodies": {"E_star": 1, "hardnes": 2}}, "did you mean 'hardness'"),
+        ({"bodies": "42CrMo5"}, "no known unit of stress"),
+        ({"bodies": True}, "real numbers"),
+        ({"bodies": Bodies(58.0, hardness=[1.0, 2.0])}, "hardness must be one number"),
+        (
+            {"bodies": Bodies(58.0, conductivity=np.array([1.0, 2.0]))},
+            "conductivity must be one number",
+        ),
+        ({"bodies": Bodies(58.0, conductivity="45 furlong")}, "conductivities are"),
+        ({"gas": {"name": "air", "temp": 3}}, "no argument 'temp'.*temperature"),
+        ({"gas": Gas(temperature=[300.0, 400.0])}, "temperature .*one number"),
+        ({"gas": Gas(pressure=["1 bar", "2 bar"])}, "pressure .*one number"),
+        ({"gas": None}, "no gas is named None"),
+    ],
+    ids=str,
+)
+def test_odd_bodies_and_gases_of_a_joint_are_refused(changed, match):
+    described = {"part_a": FACE, "bodies": METALS, "nominal_area": "4 cm^2"}
+    with pytest.raises(InputError, match=match):
+        Joint(**described | changed)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from mbma_tables import (
     Bodies,
+    Gas,
     Scene,
     Surface,
     contact,
@@ -421,3 +422,53 @@ def test_microhardness_of_the_contacts_of_a_face():
     for c1, c2, match in (("5 GPa", 0.1, "c2"), (-1.0, -0.1, "c1")):
         with pytest.raises(OutOfRangeError, match=match):
             materials.microhardness(face, c1, c2)
+
+
+def test_youngs_moduli_give_the_effective_modulus():
+    steel_on_glass = Bodies(E=("210 GPa", "70e3 MPa"), nu=(0.3, 0.22))
+    compliance = (1 - 0.3**2) / 210 + (1 - 0.22**2) / 70
+    found = contact(FACE, steel_on_glass, pressure="1 MPa")
+    assert found.units["pressure"] == "GPa"
+    assert found.E_star == pytest.approx(1 / compliance, rel=1e-12)
+    # a modulus that was rounded by hand is theirs, and plain ones are in its unit
+    for rounded, E in ((55.9, (210.0, 70.0)), ("55.9e3 MPa", (210e3, 70e3))):
+        both = contact(FACE, Bodies(rounded, E=E, nu=(0.3, 0.22)), pressure=0.001)
+        assert both.tangential_stiffness == pytest.approx(
+            both.stiffness / materials.tangential_ratio((0.3, 0.22), (210.0, 70.0))
+        )
+
+
+@pytest.mark.parametrize(
+    ("constants", "match"),
+    [
+        ({"E_star": "100 GPa", "E": ("210 GPa", "70 GPa"), "nu": (0.3, 0.22)}, "contradicts E and nu.*leave E_star"),
+        ({"E_star": 58e3, "E": (210.0, 70.0), "nu": (0.3, 0.22)}, "contradicts E and nu"),
+        ({"metals": "silver", "E": (100.0, 200.0), "nu": (0.3, 0.3)}, "E and metals are both given"),
+        ({"metals": "silver", "E_star": "100 GPa"}, "E_star and metals are both given"),
+        ({"E": (210.0, 70.0)}, "E needs nu"),
+        ({"E": "210 GPa", "nu": 0.3}, "two each"),
+        ({"E": 210.0, "nu": 0.3}, "two each"),
+        ({"E": (210.0, np.nan), "nu": (0.3, 0.3)}, "E2 must be finite"),
+        ({"nu": 0.7}, r"nu must be in \(-1, 0.5\]"),
+        ({"nu": "0.3 GPa"}, "nu must be real numbers|nu has no unit"),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_contradictory_bodies_are_refused(constants, match):
+    with pytest.raises(InputError, match=match):
+        Bodies(**constants)
+
+
+def test_gases_are_checked_when_they_are_described():
+    assert Gas("helium", pressure="10 mbar").pascals == pytest.approx(1000.0)
+    assert Gas("vacuum", pressure=0.0).name == "vacuum"
+    for described, match in (
+        ({"name": "vacuum", "accommodation": 7}, r"accommodation must be in \(0, 1\]"),
+        ({"name": "air", "accommodation": 0.0}, r"accommodation must be in \(0, 1\]"),
+        ({"name": "air", "temperature": "hot"}, "temperature must be real numbers"),
+        ({"name": "air", "temperature": np.nan}, "temperature must be finite"),
+        ({"name": "air", "pressure": "1 furlong"}, "no known unit of stress"),
+        ({"name": ["air"]}, "no gas is named"),
+    ):
+        with pytest.raises(InputError, match=match):
+            Gas(**described)

@@ -162,7 +162,9 @@ _joint_options = option_group(
 )
 @toml_file
 @numbers_option(
-    "--pressure", "-p", help="Force over nominal area; plain numbers are in GPa."
+    "--pressure",
+    "-p",
+    help="Force over nominal area; plain numbers are in the unit of the modulus, GPa for metals.",
 )
 @click.option(
     "--force",

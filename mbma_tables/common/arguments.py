@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import dataclasses
 import difflib
 import functools
 import importlib
@@ -9,7 +11,7 @@ import inspect
 import itertools
 import math
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
@@ -70,6 +72,16 @@ def require_name(kind: str, name: Any, candidates: Iterable[str]) -> None:
     names = list(candidates)
     if name not in names:
         raise InputError(f"no {kind} is named {name!r}; {nearest(str(name), names)}")
+
+
+def require_fields(kind: type, given: Mapping[str, Any]) -> None:
+    """Reject a mapping with names that are no arguments of a dataclass, with the nearest one."""
+    names = [field.name for field in dataclasses.fields(kind) if field.init]
+    for name in given:
+        if name not in names:
+            raise InputError(
+                f"{kind.__name__} has no argument {name!r}: {nearest(str(name), names)}"
+            )
 
 
 # where constants of bodies and options of a theory are given
@@ -133,6 +145,13 @@ def is_labelled(value: Any) -> bool:
     """Whether `value` is an xarray DataArray, without importing xarray."""
     xarray = sys.modules.get("xarray")
     return xarray is not None and isinstance(value, xarray.DataArray)
+
+
+def detached(value: Any) -> Any:
+    """A copy of an array, a DataArray or a list, which its owner may go on changing; other values as they are."""
+    if isinstance(value, np.ndarray | list) or is_labelled(value):
+        return copy.deepcopy(value)
+    return value
 
 
 def any_labelled(surface: Any, *values: Any) -> bool:

@@ -24,7 +24,7 @@ _LENGTHS = (
     "m=1 km=1e3 cm=1e-2 mm=1e-3 um=1e-6 nm=1e-9 angstrom=1e-10 pm=1e-12 ft=0.3048 "
     "in=0.0254 mil=254e-7 uin=254e-10"
 )
-_STRESSES = "Pa=1 kPa=1e3 MPa=1e6 GPa=1e9 TPa=1e12 bar=1e5 atm=101325"
+_STRESSES = "Pa=1 kPa=1e3 MPa=1e6 GPa=1e9 TPa=1e12 mbar=1e2 bar=1e5 atm=101325"
 
 
 def _sizes(text: str) -> dict[str, Fraction]:
@@ -294,6 +294,20 @@ def _named(name: str, value: Any, kind: str) -> str | None:
         return read(name, value)[1]
     stated = getattr(value, "attrs", {}).get("units")
     return stated if stated in SIZES[kind] else None
+
+
+def stated_unit(name: str, value: Any) -> str | None:
+    """The unit of stress that a value states, as a text, in a list, or as a DataArray; None of plain numbers."""
+    return _named(name, value, "stress")
+
+
+def number_with_unit(name: str, value: Any, unit: str | None) -> str:
+    """A stress as a text with the unit that it states, or with another if it states none."""
+    stated = stated_unit(name, value)
+    if isinstance(value, str) and stated is not None:
+        return value
+    number = positive_array(name, Units(stress=stated).number(name, value))
+    return f"{float(one_number(name, number))!r} {stated or unit}"
 
 
 def require_surface(surface: Any) -> None:

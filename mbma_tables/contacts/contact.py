@@ -171,9 +171,9 @@ def _solved(
     E_star: Any,
     hardness: Any,
 ) -> Solved:
-    """The contact of plain arrays at a given quantity."""
-    modulus = positive_array("E_star", E_star)
-    cap = checked_hardness(hardness) if setup.bodies.yields else np.asarray(np.inf)
+    """The contact of plain arrays at a given quantity; modulus and hardness are checked already."""
+    modulus = np.asarray(E_star)
+    cap = np.asarray(hardness if setup.bodies.yields else np.inf)
     shape = broadcast_shape(
         **{
             question.name: question.value,
@@ -301,7 +301,9 @@ def _of_labelled(setup: Setup, question: Question) -> Contact:
     def solve(
         block: AnySurface, given: Any, E_star: Any, hardness: Any
     ) -> tuple[Any, ...]:
-        solved = _solved(setup, block, question.of_block(given), E_star, hardness)
+        modulus = positive_array("E_star", E_star)
+        cap = checked_hardness(hardness)
+        solved = _solved(setup, block, question.of_block(given), modulus, cap)
         return tuple(solved.values[name] for name in ANSWERED)
 
     name = question.name

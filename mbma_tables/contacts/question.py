@@ -31,7 +31,10 @@ class Question:
         """The one candidate that is not None: numbers, texts with units, or lists of them."""
         name = name_of_the_given(candidates)
         numbers = units.number(name, candidates[name])
-        return cls(name, numbers if is_labelled(numbers) else finite_array(name, numbers))
+        # copies, since results hold them and their owner may go on changing what was given
+        if is_labelled(numbers):
+            return cls(name, numbers.copy())
+        return cls(name, np.array(finite_array(name, numbers)))
 
     def of_block(self, numbers: Any) -> Question:
         """The same question at other numbers, as those of a block of a DataArray."""

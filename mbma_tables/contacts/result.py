@@ -214,6 +214,7 @@ class Contact(State, Displayed):
                 block, self.surface, arrays, outputs
             )
             return labelled
+        broadcast_shape(surface=self.surface.h_rms, **arrays)
         plain = map(np.asarray, arrays.values())
         return tuple(part[()] for part in block(self.surface, *plain))
 

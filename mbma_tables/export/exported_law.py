@@ -14,7 +14,7 @@ from mbma_tables.bodies import Bodies
 from mbma_tables.common.arguments import FloatArray, Numbers, number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.common.units import Units, factor, in_unit
+from mbma_tables.common.units import factor, in_unit
 from mbma_tables.contacts.contact import chosen_theory, contact
 from mbma_tables.export.text import about, number
 from mbma_tables.law import block as at
@@ -60,7 +60,7 @@ class GasInGaps(NamedTuple):
     unit: float  # one W/(m^2 K) in the unit of the law's conductance
 
     def __str__(self) -> str:
-        pressure = Units(stress="Pa").number("gas_pressure", self.gas.pressure)
+        pressure = self.gas.pascals
         temperature = about(float(np.asarray(self.gas.temperature)))
         return f"{self.gas.name} at {temperature} K and {about(pressure, 6)} Pa"
 

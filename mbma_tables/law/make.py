@@ -110,6 +110,7 @@ def law_of(
         raise InputError(
             f"hardness must be one number, got shape {hardness.shape}: a law is of one surface"
         )
+    given.require_one_conductivity()
     one = _one_surface(surface)
     chosen = chosen_theory(surface, theory)
     asked = max(chosen.rtol, MIN_LAW_RTOL) if rtol is None else rtol

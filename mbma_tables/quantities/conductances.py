@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import Numbers
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.units import HEAT_CONDUCTANCE, Units, factor
-from mbma_tables.quantities.gas import VACUUM, jump_of, mean_inverse
+from mbma_tables.common.units import HEAT_CONDUCTANCE, factor
+from mbma_tables.quantities.gas import GASES, VACUUM, jump_of, mean_inverse
 from mbma_tables.quantities.interface import Gas
 from mbma_tables.quantities.registry import Need, quantity
 from mbma_tables.quantities.state import State
@@ -77,7 +77,14 @@ def conductance(contact: State) -> Any:
     459 (2003) 53). In W/(m^2 K) for conductivities such as "45 W/(m K)", in S/m^2 for "6e6 S/m".
     The slope of the loading curve of yielded contacts is up to ten times smaller.
     """
-    return contact.bodies.conductivity[0] / contact.E_star * contact.unloading_stiffness
+    return contact.evaluate(
+        lambda theory, surface, u, E_star, k_s, stiffness: (k_s / E_star * stiffness,),
+        1,
+        {
+            "conductivity": contact.bodies.conductivity[0],
+            "unloading_stiffness": contact.unloading_stiffness,
+        },
+    )[0]
 
 
 @quantity(
@@ -110,12 +117,18 @@ def conductance_of_gas(contact: State, gas: Gas) -> Any:
     if gas.name == VACUUM:
         return 0.0 * contact.mean_separation
     metre = factor("m", contact.unit_system.length)
-    pressure = Units(stress="Pa").number("gas_pressure", gas.pressure)
-    conductivity, jump = jump_of(gas.name, gas.temperature, pressure, gas.accommodation)
 
     def mean(
-        theory: Any, surface: Any, u: Any, E_star: Any, area: Any
+        theory: Any,
+        surface: Any,
+        u: Any,
+        E_star: Any,
+        area: Any,
+        temperature: Any,
+        pressure: Any,
+        accommodation: Any,
     ) -> tuple[Any, ...]:
+        conductivity, jump = jump_of(gas.name, temperature, pressure, accommodation)
         eta = getattr(theory, "hardness", np.inf) / np.asarray(surface.rms_gradient)
         return (
             conductivity
@@ -123,7 +136,14 @@ def conductance_of_gas(contact: State, gas: Gas) -> Any:
             * mean_inverse(u, area, jump * metre, surface.h_rms, eta),
         )
 
-    return contact.evaluate(mean, 1, {"area": contact.area})[0]
+    of_metals = GASES[gas.name].accommodation
+    arrays = {
+        "area": contact.area,
+        "temperature": gas.temperature,
+        "gas_pressure": gas.pascals,
+        "accommodation": of_metals if gas.accommodation is None else gas.accommodation,
+    }
+    return contact.evaluate(mean, 1, arrays)[0]
 
 
 def cooper_mikic_yovanovich(

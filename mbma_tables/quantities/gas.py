@@ -8,7 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray, finite_array, nearest, require, rows
+from mbma_tables.common.arguments import (
+    FloatArray,
+    broadcast_shape,
+    finite_array,
+    nearest,
+    require,
+    rows,
+)
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.shared import shared
@@ -73,10 +80,28 @@ GASES = {
 VACUUM = "vacuum"
 
 
-def checked_gas(gas: str, temperature: ArrayLike, pressure: ArrayLike) -> None:
-    """Reject an unknown gas, and a temperature [K] or pressure [Pa] at which its properties are not known."""
+def checked_gas(
+    gas: Any, temperature: ArrayLike, pressure: ArrayLike, accommodation: ArrayLike | None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Temperature [K], pressure [Pa] and thermal accommodation of a gas, at which its properties are known."""
+    if not isinstance(gas, str) or gas not in (*GASES, VACUUM):
+        raise InputError(
+            f"no gas is named {gas!r}: {nearest(str(gas), [*GASES, VACUUM])}"
+        )
+    if accommodation is None:
+        accommodation = 1.0 if gas == VACUUM else GASES[gas].accommodation
+    T = finite_array("temperature", temperature)
+    P = finite_array("gas_pressure", pressure)
+    share = finite_array("accommodation", accommodation)
+    require("accommodation", share, (share > 0) & (share <= 1), "in (0, 1]")
+    # without a gas neither temperature nor pressure matters
     if gas != VACUUM:
-        jump_of(gas, temperature, pressure)
+        low = TEMPERATURES[0]
+        high = TEMPERATURES[-1]
+        require("temperature", T, (low <= T) & (high >= T), f"from {low:g} to {high:g} K")
+        require("gas_pressure", P, P > 0, "positive; 'vacuum' is without a gas")
+    broadcast_shape(temperature=T, gas_pressure=P, accommodation=share)
+    return T, P, share
 
 
 def jump_of(
@@ -102,21 +127,8 @@ def jump_of(
     >>> f"{k:.4f} W/(m K), {1e6 * jump:.2f} um"
     '0.0262 W/(m K), 0.30 um'
     """
-    if not isinstance(gas, str) or gas not in GASES:
-        raise InputError(
-            f"no gas is named {gas!r}: {nearest(str(gas), [*GASES, VACUUM])}"
-        )
+    T, P, share = checked_gas(gas, temperature, pressure, accommodation)
     one = GASES[gas]
-    T = finite_array("temperature", temperature)
-    P = finite_array("gas_pressure", pressure)
-    share = finite_array(
-        "accommodation", one.accommodation if accommodation is None else accommodation
-    )
-    low = TEMPERATURES[0]
-    high = TEMPERATURES[-1]
-    require("temperature", T, (low <= T) & (high >= T), f"from {low:g} to {high:g} K")
-    require("gas_pressure", P, P > 0, "positive; 'vacuum' is without a gas")
-    require("accommodation", share, (share > 0) & (share <= 1), "in (0, 1]")
     k, eta = (
         np.exp(np.interp(np.log(T), np.log(TEMPERATURES), np.log(row)))
         for row in (one.conductivity, one.viscosity)

@@ -432,7 +432,7 @@ def test_dimensions_by_name():
         assert values.surface.values.tolist() == ["a", "b", "c"]
         assert values.gap.values.tolist() == list(range(7))
     assert found.pressure.attrs["long_name"] == "force over nominal area"
-    assert found.separation is gaps
+    assert found.separation.identical(gaps)
     assert gaps.attrs == {"units": "mm", "long_name": "separation"}
     # above h_max the bodies are apart
     expected = np.maximum((h_max + gaps.values) / 2, gaps.values)
@@ -607,3 +607,84 @@ def test_reasons_of_ones_own_theory_are_those_of_its_contacts():
     found = contact(SURFACE, mean_separation=[0.5, 1.5], theory=Careful())
     assert found.reasons["u is below 1"].tolist() == [True, False]
     assert not found.valid[0]
+
+
+@pytest.mark.parametrize("hardness", [None, 1.5])
+def test_a_list_of_moduli_is_an_array(hardness):
+    moduli = [57.0, 58.0]
+    bodies = Bodies(
+        moduli, hardness=hardness, nu=0.3, conductivity=np.array([40.0, 60.0])
+    )
+    of_list = contact(SURFACE, bodies, pressure=0.01, theory="calibrated")
+    assert "Contact(" in repr(of_list)
+    assert of_list.to_dataset()["pressure"].size == 2
+    for k, (modulus, k_s) in enumerate(zip(moduli, (40.0, 60.0), strict=True)):
+        one = Bodies(modulus, hardness=hardness, nu=0.3, conductivity=k_s)
+        single = contact(SURFACE, one, pressure=0.01, theory="calibrated")
+        names = ["area", "stiffness", "conductance", "scatter"]
+        names += [] if hardness is None else ["psi", "yielded"]
+        for name in names:
+            assert getattr(of_list, name)[k] == pytest.approx(getattr(single, name))
+    with_units = contact(SURFACE, ["57 GPa", "58e3 MPa"], pressure="10 MPa")
+    np.testing.assert_allclose(with_units.E_star, moduli)
+    with pytest.raises(InputError, match="conductivity must be one number"):
+        contact_law(SURFACE, Bodies(58.0, conductivity=np.array([40.0, 60.0])))
+
+
+def test_what_was_given_may_be_changed_afterwards():
+    gaps = np.array([1.9, 2.0])
+    moduli = np.array([100.0, 200.0])
+    caps = np.array([1.0, 2.0])
+    named = xr.DataArray(gaps.copy(), dims="gap")
+    bodies = Bodies(moduli, hardness=caps)
+    pressed = contact(SURFACE, bodies, mean_separation=gaps, theory="calibrated")
+    of_named = contact(SURFACE, 100.0, mean_separation=named, theory="calibrated")
+    law = contact_law(SURFACE, 100.0, theory="calibrated")
+    pressures = law.pressure(gaps)
+    before = pressures.copy()
+    of_law = law.at(gaps), law.at(pressure=pressures)
+    for array in (gaps, moduli, caps, named, pressures):
+        array[:] = 1.0
+    np.testing.assert_array_equal(pressed.mean_separation, [1.9, 2.0])
+    np.testing.assert_array_equal(of_named.mean_separation, [1.9, 2.0])
+    np.testing.assert_array_equal(bodies.E_star, [100.0, 200.0])
+    np.testing.assert_array_equal(bodies.hardness, [1.0, 2.0])
+    np.testing.assert_array_equal(of_law[0].mean_separation, [1.9, 2.0])
+    np.testing.assert_array_equal(of_law[1].pressure, before)
+    anew = contact(
+        SURFACE,
+        Bodies([100.0, 200.0], hardness=[1.0, 2.0]),
+        mean_separation=[1.9, 2.0],
+        theory="calibrated",
+    )
+    np.testing.assert_array_equal(pressed.stiffness, anew.stiffness)
+
+
+def test_labels_of_conductivities_and_of_a_gas_are_kept():
+    face = dataclasses.replace(SURFACE, unit="um")
+    pressures = xr.DataArray([0.01, 0.02], dims="p", coords={"p": [10, 20]})
+    k = xr.DataArray([40.0, 50.0], dims="k", coords={"k": ["a", "b"]})
+    bodies = Bodies("100 GPa", conductivity=k)
+    for asked in (pressures, 0.01):
+        pressed = contact(face, bodies, pressure=asked, theory="calibrated")
+        assert set(pressed.conductance.dims) == {"k"} | set(getattr(asked, "dims", ()))
+    pressed = contact(face, bodies, pressure=pressures, theory="calibrated")
+    table = pressed.conductance.transpose("k", "p").values
+    for i, k_s in enumerate(k.values):
+        plain = Bodies("100 GPa", conductivity=k_s)
+        for j, pressure in enumerate(pressures.values):
+            one = contact(face, plain, pressure=pressure, theory="calibrated")
+            assert table[i, j] == pytest.approx(one.conductance, rel=1e-12)
+    T = xr.DataArray([300.0, 400.0], dims="T")
+    of_gas = pressed.gap_conductance("air", T)
+    assert set(of_gas.dims) == {"p", "T"}
+    for j, temperature in enumerate(T.values):
+        one = contact(face, "100 GPa", pressure=pressures.values, theory="calibrated")
+        np.testing.assert_allclose(
+            of_gas.isel(T=j), one.gap_conductance("air", temperature), rtol=1e-12
+        )
+    with pytest.raises(InputError, match="temperature must be one or a scalar"):
+        pressed.gap_conductance("air", [300.0, 400.0])
+    plain = contact(face, "100 GPa", pressure=[0.01, 0.02], theory="calibrated")
+    with pytest.raises(InputError, match="do not broadcast"):
+        plain.gap_conductance("air", [300.0, 400.0, 500.0])
