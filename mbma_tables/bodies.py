@@ -190,12 +190,12 @@ class Bodies:
     def in_units(self, surface: Any, stress_unit: str | None = None) -> BodiesInUnits:
         """The constants as numbers, in the surface's unit of length and the modulus's, or another, of stress."""
         E_star, units = modulus_and_units(self.E_star, surface, stress_unit)
-        if not is_labelled(E_star):
+        if isinstance(E_star, float) or not is_labelled(E_star):
             E_star = positive_array("E_star", E_star)[()]
         hardness: Any = np.inf
         if self.hardness is not None:
             hardness = materials.hardness_in(units, self.hardness)
-            if not is_labelled(hardness):
+            if isinstance(hardness, float) or not is_labelled(hardness):
                 hardness = checked_hardness(hardness)[()]
         return BodiesInUnits(self, E_star, hardness, units)
 

@@ -480,7 +480,7 @@ def hardness(given: str) -> str:
         return f"{_pressure_of_number(float(match[1]), match[2], match[3], match[4]):.6g} GPa"
     # a name such as 6061-T6 begins with a digit; 1.4301 alone is a number here
     plain = text.strip().replace(".", "").isdigit()
-    if text.strip()[:1].isalpha() or (is_name(text) and not plain):
+    if text.strip()[:1].isalpha() or (_full_name(text) and not plain):
         try:
             pressure = pair(text).hardness
         except InputError as fault:
