@@ -22,6 +22,7 @@ COMMANDS = {
         "generate.boundary_elements.run",
     ),
     **dict.fromkeys(("film", "tangential"), "generate.machined.studies"),
+    "artefacts": "generate.machined.artefacts",
     "edges": "generate.machined.edges",
     "formulas": "generate.formulas",
     "machined": "generate.machined.campaign",

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 from helpers import topographies
 
-from generate.machined.makers import FAMILIES, Part, heights
+from generate.machined.artefacts import (
+    CUTOFF,
+    KINDS,
+    opened,
+    squares,
+    step,
+    with_artefact,
+)
+from generate.machined.makers import FAMILIES, Part, finished, heights
 from mbma_tables import OutOfRangeError, Surface, contact
 from mbma_tables.surfaces.averages import average
 from mbma_tables.theories import Simulated
@@ -36,8 +44,12 @@ def with_spikes(share, seed=0):
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_machined_surfaces_raise_no_doubt(family):
-    assert of(heights(Part(family, 1, 64))).doubts == ()
+@pytest.mark.parametrize("points", [64, 128])
+def test_machined_surfaces_raise_no_doubt(family, points):
+    for number in (1, 2, 3):
+        values = heights(Part(family, number, points))
+        assert of(values).doubts == ()
+        assert opened(values).doubts == ()
 
 
 class TestSpikes:
@@ -64,7 +76,45 @@ class TestSpikes:
     def test_the_edge_of_a_pillar_is_none(self):
         pillar = 0.1 * heights(Part("gaussian", 1, 64))
         pillar[20:30, 20:30] += 5.0
-        assert of(pillar).doubts == ()
+        assert of(finished(pillar, 5.0)).doubts == ()
+        # a cut-off rings where the edge is within one sampling step
+        assert not any("spikes" in text for text in of(pillar).doubts)
+        assert of(pillar, short_cutoff=4.0).doubts
+
+
+class TestSharpPlaces:
+    """Dust, lost lines and images that do not fit, which a cut-off makes smooth."""
+
+    @pytest.mark.parametrize("artefact", KINDS, ids=lambda artefact: artefact.name)
+    @pytest.mark.parametrize("family", ["gaussian", "milled", "worn", "patchy"])
+    def test_results_are_not_valid(self, artefact, family):
+        values, clean = with_artefact(Part(family, 1, 96), artefact)
+        assert opened(clean).doubts == ()
+        assert opened(values).doubts
+
+    @pytest.mark.parametrize(
+        "artefact", [squares(1, 1e-3, 8.0), squares(3, 1e-3, 8.0), step(20.0, 1.5)]
+    )
+    @pytest.mark.parametrize("periodic", [True, False])
+    @pytest.mark.parametrize("unit", [None, "um"])
+    def test_whatever_the_unit_and_the_tilt(self, artefact, periodic, unit):
+        values, _ = with_artefact(PART, artefact)
+        tilted = values if periodic else values + 0.2 * np.arange(64.0)
+        assert Surface.from_map(
+            1e-3 * tilted, 1e-3, periodic=periodic, short_cutoff=1e-3 * CUTOFF, unit=unit
+        ).doubts
+
+    @pytest.mark.parametrize("artefact", [squares(3, 1e-4, 8.0), squares(5, 1e-4, 8.0)])
+    def test_the_part_that_is_named_is_valid(self, artefact):
+        part = Part("gaussian", 1, 128)
+        values, _ = with_artefact(part, artefact)
+        found = contact(opened(values), area=0.1, theory="simulated")
+        assert not found.valid
+        reason = next(iter(found.reasons))
+        call = re.search(r"Surface\.from_map\(heights\[.*?\], \.\.\.\)", reason)[0]
+        options = f"1.0, short_cutoff={CUTOFF}"
+        names = {"Surface": Surface, "heights": values}
+        assert asked(eval(call.replace("...", options), names)).valid
 
 
 class TestHoles:
