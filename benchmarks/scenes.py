@@ -21,7 +21,7 @@ EFFECTS = (
     ("pressure", "energy"),
     ("pressure", "area", "comparison"),
     ("area", "island_statistics"),
-    ("pressure", "conductance"),
+    ("pressure", "solid_conductance"),
 )
 
 
@@ -74,7 +74,7 @@ def scenes(rng: np.random.Generator) -> None:
         extra: dict[str, Any] = (
             {"theories": ["greenwood_williamson"]} if "comparison" in effects else {}
         )
-        if "conductance" in effects:
+        if "solid_conductance" in effects:
             extra |= {"conductivities": (50.0, 20.0)}
         try:
             scene = Scene(surface, effects=effects, separations=gaps, rtol=rtol, **extra)

@@ -331,7 +331,7 @@ CALLS: dict[str, Callable[..., Any]] = {
     "flow_factors": flow_factors,
     "island": island,
     "joint": lambda asked, *parts, **options: (
-        Joint(*parts, **options).at_pressure(asked).conductance
+        Joint(*parts, **options).at_pressure(asked).solid_conductance
     ),
 }
 PART = {"Rq": "0.4 um", "longest": "100 um", "shortest": "2 um", "hurst": 0.8}

@@ -35,7 +35,7 @@ QUANTITIES = (
     "mean_separation",
     "stiffness",
     "unloading_stiffness",
-    "conductance",
+    "solid_conductance",
 )
 
 
@@ -81,7 +81,7 @@ class Question:
     def values_of(self, found: Any) -> dict[str, FloatArray]:
         """The quantities of a contact."""
         values = {name: np.asarray(getattr(found, name)) for name in QUANTITIES[:-1]}
-        values["conductance"] = np.asarray(found.conductance)
+        values["solid_conductance"] = np.asarray(found.solid_conductance)
         return values
 
     def misses(self, values: dict[str, Any]) -> list[FloatArray]:
@@ -195,7 +195,7 @@ def law_misses(
     elastic, _ = law.unloading()
     stated = {
         "stiffness": np.asarray(law.slope_error(gaps)),
-        "conductance": np.asarray(elastic.slope_error(gaps)),
+        "solid_conductance": np.asarray(elastic.slope_error(gaps)),
     }
     misses = []
     for name, found in values.items():
@@ -253,7 +253,7 @@ def by_c(question: Question) -> list[FloatArray]:
             "area": values_of("area"),
             "stiffness": values_of("tangent") / 1e6,
             # mW/(mm K) per mm^2 is 1000 W/(m^2 K)
-            "conductance": values_of("conductance") * 1e3,
+            "solid_conductance": values_of("conductance") * 1e3,
         }
     return law_misses(question, law, values)
 

@@ -146,7 +146,7 @@ class Joint(JointQuantities, Displayed):
     >>> metals = ("steel 4140 hard", "aluminium 6061 hard")
     >>> joint = Joint(ground, milled, bodies=metals, nominal_area="4 cm^2")
     >>> found = joint.at_pressure("10 MPa")
-    >>> f"{found.area:.2%}, {found.conductance:.3g} W/(m^2 K), {found.tangential_stiffness:.3g} GPa/um"
+    >>> f"{found.area:.2%}, {found.solid_conductance:.3g} W/(m^2 K), {found.tangential_stiffness:.3g} GPa/um"
     '1.17%, 3.96e+04 W/(m^2 K), 0.0271 GPa/um'
     >>> table = joint.table(["10 MPa", "50 MPa"])
     >>> [f"{value:.3g}" for value in table["total_conductance"].values]
@@ -689,7 +689,7 @@ class Joint(JointQuantities, Displayed):
             ),
             f"thermal conductance [{HEAT_CONDUCTANCE.unit(UNKNOWN)}]": (
                 "total_conductance",
-                "conductance",
+                "solid_conductance",
                 "gas_conductance",
             ),
         }

@@ -52,15 +52,15 @@ def test_a_joint_is_the_contact_of_the_combined_surface(joint):
     )
     table = joint.table(["1 MPa", "50 MPa"])
     np.testing.assert_array_equal(table["area"], known.area)
-    np.testing.assert_array_equal(table["conductance"], known.conductance)
+    np.testing.assert_array_equal(table["solid_conductance"], known.solid_conductance)
     np.testing.assert_array_equal(
-        table["total_conductance"], known.conductance + known.gap_conductance("air")
+        table["total_conductance"], known.solid_conductance + known.gap_conductance("air")
     )
     np.testing.assert_array_equal(
         table["tangential_stiffness"], known.tangential().stiffness
     )
     assert table["pressure"].attrs["units"] == "GPa"
-    assert table["conductance"].attrs["units"] == "W/(m^2 K)"
+    assert table["solid_conductance"].attrs["units"] == "W/(m^2 K)"
     assert joint.surface.h_rms == pytest.approx(np.hypot(0.4, 0.7), rel=1e-6)
 
 
@@ -224,7 +224,7 @@ def test_cards_hold_the_joint(joint):
     # mW/(mm^2 K) is 1000 W/(m^2 K)
     found = joint.at_pressure((p[1:] / 1000).tolist())
     # of the solid spots and of the air in the gaps
-    both = found.conductance + found.gap_conductance("air")
+    both = found.solid_conductance + found.gap_conductance("air")
     np.testing.assert_allclose(1000 * k[1:], both, rtol=2e-3)  # of the rows
     assert "hardness = 950.0 MPa" in card
     closure = joint.export("abaqus", ("1 MPa", "50 MPa"), heat=False)
@@ -281,7 +281,7 @@ def test_functions_of_yielded_joints(joint, tmp_path):
         "pressure": 10.0,
         "tangent": 1e6 * found.stiffness,
         "tangential_stiffness": 1e6 * found.tangential().stiffness,
-        "conductance": 1e-3 * found.conductance,
+        "conductance": 1e-3 * found.solid_conductance,
     }.items():
         function = bolt[f"bolt_{what}"]
         function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double]
@@ -461,11 +461,11 @@ def test_results_without_units_are_displayed():
     joint = Joint(plain, bodies="steel 1020", theory="calibrated")
     assert "steel 1020" in repr(joint)
     pressed = joint.at_pressure([0.01, 0.02])
-    assert "conductance needs the surface's unit" in repr(pressed)
-    assert "conductance" not in pressed.to_dataset()
+    assert "solid_conductance needs the surface's unit" in repr(pressed)
+    assert "solid_conductance" not in pressed.to_dataset()
     assert "theory" in pressed._repr_html_()
-    assert "conductance needs the surface's unit" in repr(joint.at_pressure(0.01))
-    for name in ("conductance", "gas_conductance", "total_conductance"):
+    assert "solid_conductance needs the surface's unit" in repr(joint.at_pressure(0.01))
+    for name in ("solid_conductance", "gas_conductance", "total_conductance"):
         assert name not in joint.table(0.01)
         with pytest.raises(InputError, match="give the surface its unit"):
             getattr(pressed, name)

@@ -297,7 +297,9 @@ def test_metals_named_answer_as_their_numbers_do():
     )
     for name in ("area", "mean_separation", "stiffness", "unloading_stiffness"):
         np.testing.assert_allclose(getattr(named, name), getattr(plain, name), rtol=1e-12)
-    np.testing.assert_allclose(named.conductance, plain.conductance, rtol=1e-5)
+    np.testing.assert_allclose(
+        named.solid_conductance, plain.solid_conductance, rtol=1e-5
+    )
     law = contact_law(
         FACE, ("steel 4140 hard", "aluminium 6061 hard"), theory="calibrated"
     )
@@ -305,8 +307,10 @@ def test_metals_named_answer_as_their_numbers_do():
     with pytest.raises(InputError, match="E_star and metals"):
         contact_of(FACE, Bodies("100 GPa", metals="silver"), **asked)
     without = contact_of(FACE, f"{modulus} GPa", **asked)
-    with pytest.raises(InputError, match=r"conductance needs conductivity.*named metals"):
-        _ = without.conductance
+    with pytest.raises(
+        InputError, match=r"solid_conductance needs conductivity.*named metals"
+    ):
+        _ = without.solid_conductance
 
 
 def test_metals_that_yield_are_not_valid_without_a_hardness():

@@ -68,7 +68,7 @@ def of_a_law():
 def of_a_joint():
     joint = Joint(FACE, FACE, bodies=METALS, nominal_area="4 cm^2", theory="calibrated")
     found = joint.at_pressure(PRESSURES)
-    return [found.area, found.mean_separation, found.stiffness, found.conductance]
+    return [found.area, found.mean_separation, found.stiffness, found.solid_conductance]
 
 
 def of_flow_factors():
@@ -213,7 +213,7 @@ def asked_contact(found):
 
 def asked_joint(joint):
     found = joint.at_pressure(PRESSURES)
-    return [found.area, found.stiffness, found.conductance]
+    return [found.area, found.stiffness, found.solid_conductance]
 
 
 def asked_surface(surface):

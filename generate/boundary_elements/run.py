@@ -311,7 +311,7 @@ LIGHT_SEEDS = (1, 2, 3, 4, 5)
 LIGHT_BINS = (2e-4, 5e-4, 1e-3, 3e-3, 1e-2)  # A/A0
 
 JUMPS = np.array([0.03, 0.1, 0.3, 1.0, 3.0])  # of a gas's temperature [h_rms]
-AREAS = (0.003, 0.01, 0.03, 0.1, 0.2, 0.35, 0.55, 0.75)
+AREAS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.2, 0.35, 0.55, 0.75)
 # contact fractions
 LIGHT = 0.05
 HEAVY = 0.3

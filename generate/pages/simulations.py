@@ -66,7 +66,7 @@ def conductances(one: Joint, pressure: FloatArray) -> tuple[FloatArray, FloatArr
     k = mean_conductivity(*conductivities)
     assert one.pair.hardness is not None
     hardness = 1e3 * float(one.pair.hardness.split()[0])
-    law = one.at_pressure([f"{p} MPa" for p in pressure]).conductance
+    law = one.at_pressure([f"{p} MPa" for p in pressure]).solid_conductance
     # lengths in um, so that W/(m K) over um is 1e6 W/(m^2 K)
     correlation = cooper_mikic_yovanovich(one.surface, pressure, k, 1.0, hardness)
     return np.asarray(law), 1e6 * np.asarray(correlation)

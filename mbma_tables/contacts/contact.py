@@ -103,7 +103,7 @@ def contact(
     >>> f"{pressed.area:.3%}, {pressed.mean_separation:.3f} um, {pressed.stiffness:.3g} GPa/um"
     '0.091%, 2.720 um, 0.0339 GPa/um'
     >>> metals = contact(face, ("steel 4140 hard", "aluminium 6061 hard"), pressure="10 MPa")
-    >>> f"{metals.area:.2%}, {metals.yielded:.0%} of it yields; {metals.conductance:.2g} W/(m^2 K)"
+    >>> f"{metals.area:.2%}, {metals.yielded:.0%} of it yields; {metals.solid_conductance:.2g} W/(m^2 K)"
     '1.05%, 100% of it yields; 1.1e+05 W/(m^2 K)'
 
     The paper's model at separations d:

@@ -310,7 +310,7 @@ class Contact(State, Displayed):
         gas_pressure: ArrayLike | str = "1 atm",
         accommodation: ArrayLike | None = None,
     ) -> Numbers:
-        """Conductance per nominal area of a gas in the gaps, parallel to `conductance` of the solid [W/(m^2 K)].
+        """Conductance per nominal area of a gas in the gaps, parallel to `solid_conductance` of the solid [W/(m^2 K)].
 
         The law, data of gases and their accuracy are in `mbma_tables.quantities.gas`;
         without radiation.
@@ -330,7 +330,7 @@ class Contact(State, Displayed):
         >>> from mbma_tables import Surface, contact
         >>> face = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
         >>> pressed = contact(face, "steel 1020", pressure="1 MPa", theory="calibrated")
-        >>> f"{pressed.conductance:.0f} W/(m^2 K) and {pressed.gap_conductance('air'):.0f}"
+        >>> f"{pressed.solid_conductance:.0f} W/(m^2 K) and {pressed.gap_conductance('air'):.0f}"
         '3345 W/(m^2 K) and 9921'
         """
         from mbma_tables.quantities.conductances import conductance_of_gas
@@ -368,7 +368,7 @@ class Contact(State, Displayed):
         if np.all(self.area == 0):
             facts["contact"] = "none: the bodies are apart"
         facts["separation_scatter"] = self._shown("separation_scatter")
-        for name in ("stiffness", "unloading_stiffness", "conductance"):
+        for name in ("stiffness", "unloading_stiffness", "solid_conductance"):
             if registry.get(name).is_available(self):
                 facts[name] = self._shown(name)
         if not self.yields and self.bodies.units.stress != "1":
@@ -382,9 +382,9 @@ class Contact(State, Displayed):
                 )
         if self.elastic_theory.advice:
             facts["advice"] = self.elastic_theory.advice
-        conductance = registry.get("conductance")
+        conductance = registry.get("solid_conductance")
         if self.bodies.conductivity_is_given and conductance.missing(self):
-            facts["conductance"] = "needs the surface's unit"
+            facts["solid_conductance"] = "needs the surface's unit"
         names = ["error", "scatter", "stiffness_scatter", "valid"]
         if self.yields:
             names += ["unloading_stiffness_scatter", "psi", "yielded"]
@@ -420,7 +420,7 @@ class Contact(State, Displayed):
         title = f"hardness {shown(self.bodies.hardness, unit)}" if self.yields else ""
         order = np.argsort(-np.ravel(self.mean_separation), kind="stable")
         lines: dict[str, dict[str, Any]] = {}
-        for name in ("stiffness", "unloading_stiffness", "conductance"):
+        for name in ("stiffness", "unloading_stiffness", "solid_conductance"):
             declared = registry.get(name)
             if declared.is_available(self):
                 label = f"{name.rpartition('_')[2]} [{declared.unit(self)}]"

@@ -1,6 +1,7 @@
 """Thermal and electrical conductance of a contact: of its solid spots, of the gas in its gaps, and of both."""
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,9 +9,16 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import Numbers
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import HEAT_CONDUCTANCE, factor
-from mbma_tables.quantities.gas import GASES, VACUUM, jump_of, mean_inverse
+from mbma_tables.quantities.gas import (
+    GASES,
+    VACUUM,
+    exponent_of_gap,
+    jump_of,
+    mean_inverse,
+    scatter_of_mean,
+)
 from mbma_tables.quantities.interface import Gas
-from mbma_tables.quantities.registry import Need, quantity
+from mbma_tables.quantities.registry import DIMENSIONLESS, Need, quantity
 from mbma_tables.quantities.state import State
 
 
@@ -66,11 +74,11 @@ UNIT_OF_LENGTH = Need(
     HEAT_CONDUCTANCE,
     "conductance of the solid spots per nominal area",
     needs=(CONDUCTIVITY, UNIT_OF_CONDUCTANCE),
-    uncertainty="unloading_stiffness_scatter",
+    uncertainty="solid_conductance_scatter",
     ratio_to="unloading_stiffness",
     unit_of_state=lambda contact: contact.bodies.conductivity[1],
 )
-def conductance(contact: State) -> Any:
+def solid_conductance(contact: State) -> Any:
     """Thermal or electrical conductance of the solid spots, h = (k_s/E*) (-dF/du), at constant contact area.
 
     Conductance and stiffness solve the same potential problem (J. R. Barber, Proc. R. Soc. A
@@ -91,6 +99,7 @@ def conductance(contact: State) -> Any:
     HEAT_CONDUCTANCE,
     "thermal conductance of the gas in the gaps per nominal area",
     needs=(GAS, UNIT_OF_LENGTH),
+    uncertainty="gas_conductance_scatter",
 )
 def gas_conductance(contact: State) -> Any:
     """Thermal conductance of the gas in the gaps, parallel to that of the solid spots [W/(m^2 K)]."""
@@ -102,10 +111,70 @@ def gas_conductance(contact: State) -> Any:
     HEAT_CONDUCTANCE,
     "thermal conductance of solid spots and gas in parallel, per nominal area",
     needs=(THERMAL_CONDUCTIVITY, GAS),
+    uncertainty="total_conductance_scatter",
 )
 def total_conductance(contact: State) -> Any:
     """Thermal conductance of the solid spots and of the gas in parallel [W/(m^2 K)]."""
-    return contact.conductance + contact.gas_conductance
+    return contact.solid_conductance + contact.gas_conductance
+
+
+@quantity(
+    DIMENSIONLESS,
+    "model uncertainty: standard deviation of ln of the solid conductance at this pressure",
+    needs=(CONDUCTIVITY, UNIT_OF_CONDUCTANCE),
+    is_column=False,
+)
+def solid_conductance_scatter(contact: State) -> Any:
+    """Model uncertainty, one standard deviation of ln `solid_conductance` at this pressure.
+
+    That of the unloading stiffness, to which the conductance is proportional. The
+    uncertainty of the conductivities is not included.
+    """
+    return contact.unloading_stiffness_scatter
+
+
+@quantity(
+    DIMENSIONLESS,
+    "model uncertainty: standard deviation of ln of the gas conductance at this pressure",
+    needs=(GAS, UNIT_OF_LENGTH),
+    is_column=False,
+)
+def gas_conductance_scatter(contact: State) -> Any:
+    """Model uncertainty, one standard deviation of ln `gas_conductance` at this pressure; 0 in vacuum.
+
+    That of the distribution of gaps, by simulations with known mean gap and area, and that
+    of the mean gap (`separation_scatter`), in quadrature. NaN where no simulation was
+    compared: of areas outside 0.1% to 75%, and temperature jumps below 0.03 h_rms. The
+    uncertainty of the gas's conductivity and accommodation is not included.
+    """
+    assert contact.interface.gas is not None
+    gas = contact.interface.gas
+    if gas.name == VACUUM:
+        return 0.0 * contact.mean_separation
+
+    def scatter(gaps: Gaps, conductivity: Any, of_gap: Any) -> Any:
+        of_mean = scatter_of_mean(gaps.area, gaps.jump, gaps.h_rms)
+        return np.hypot(of_mean, exponent_of_gap(*gaps) * of_gap / gaps.u)
+
+    return _of_gaps(contact, gas, scatter, contact.separation_scatter)
+
+
+@quantity(
+    DIMENSIONLESS,
+    "model uncertainty: standard deviation of ln of the total conductance at this pressure",
+    needs=(THERMAL_CONDUCTIVITY, GAS),
+    is_column=False,
+)
+def total_conductance_scatter(contact: State) -> Any:
+    """Model uncertainty, one standard deviation of ln `total_conductance` at this pressure.
+
+    Those of `solid_conductance` and `gas_conductance`, each times its share of the total, in
+    quadrature.
+    """
+    solid = contact.solid_conductance * contact.solid_conductance_scatter
+    gas = contact.gas_conductance * contact.gas_conductance_scatter
+    with np.errstate(invalid="ignore"):
+        return np.sqrt(solid**2 + gas**2) / contact.total_conductance
 
 
 def conductance_of_gas(contact: State, gas: Gas) -> Any:
@@ -118,7 +187,27 @@ def conductance_of_gas(contact: State, gas: Gas) -> Any:
         return 0.0 * contact.mean_separation
     metre = factor("m", contact.unit_system.length)
 
-    def mean(
+    def conductance(gaps: Gaps, conductivity: Any) -> Any:
+        return conductivity * metre * mean_inverse(*gaps)
+
+    return _of_gaps(contact, gas, conductance)
+
+
+class Gaps(NamedTuple):
+    """What the laws of `mbma_tables.quantities.gas` take, in the unit of lengths of a contact."""
+
+    u: Any
+    area: Any
+    jump: Any
+    h_rms: Any
+    eta: Any
+
+
+def _of_gaps(contact: State, gas: Gas, function: Callable[..., Any], *others: Any) -> Any:
+    """``function(gaps, conductivity, *others)`` of a contact's entries, with the gas's conductivity [W/(m K)]."""
+    metre = factor("m", str(contact.unit_system.length))
+
+    def of_entries(
         theory: Any,
         surface: Any,
         u: Any,
@@ -127,14 +216,12 @@ def conductance_of_gas(contact: State, gas: Gas) -> Any:
         temperature: Any,
         pressure: Any,
         accommodation: Any,
+        *more: Any,
     ) -> tuple[Any, ...]:
         conductivity, jump = jump_of(gas.name, temperature, pressure, accommodation)
         eta = getattr(theory, "hardness", np.inf) / np.asarray(surface.rms_gradient)
-        return (
-            conductivity
-            * metre
-            * mean_inverse(u, area, jump * metre, surface.h_rms, eta),
-        )
+        gaps = Gaps(u, area, jump * metre, surface.h_rms, eta)
+        return (function(gaps, conductivity, *more),)
 
     of_metals = GASES[gas.name].accommodation
     arrays = {
@@ -143,7 +230,8 @@ def conductance_of_gas(contact: State, gas: Gas) -> Any:
         "gas_pressure": gas.pascals,
         "accommodation": of_metals if gas.accommodation is None else gas.accommodation,
     }
-    return contact.evaluate(mean, 1, arrays)[0]
+    numbered = {f"other {k}": other for k, other in enumerate(others)}
+    return contact.evaluate(of_entries, 1, arrays | numbered)[0]
 
 
 def cooper_mikic_yovanovich(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,6 +35,11 @@ TAIL = 8.0
 NODES = 96
 FULLEST = 1 - 1e-12
 BLOCK = 1 << 12  # contacts between two checks for Ctrl-C, each with NODES gaps
+# held-out simulations of gaps: jumps [h_rms], root mean square errors, smallest and
+# largest A/A0 (docs/joints.md, "Gas in the gaps", by `python -m generate gaps`)
+JUMPS = (0.03, 0.1, 0.3, 1.0, 3.0)
+ERRORS = (0.055, 0.034, 0.019, 0.008, 0.003)
+AREAS = (0.001, 0.75)
 R = 8.314462618  # J/(mol K)
 TEMPERATURES = (200.0, 300.0, 400.0, 500.0, 600.0)  # K
 
@@ -170,16 +176,85 @@ def mean_inverse(
     >>> f"{mean_inverse(2.0, 0.02, 0.3, 1.0):.3f}"  # 1/(u + M) is 0.435
     '0.573'
     """
-    columns, shape = rows(u, area, jump, h_rms, eta)
-    mean = np.empty(columns.shape[1])
+    return _over_gaps(
+        lambda density, g, distance: (density / (g + distance)).sum(axis=-1),
+        *rows(u, area, jump, h_rms, eta),
+    )
+
+
+def exponent_of_gap(
+    u: ArrayLike,
+    area: ArrayLike,
+    jump: ArrayLike,
+    h_rms: ArrayLike,
+    eta: ArrayLike = np.inf,
+) -> FloatArray:
+    """-d ln(`mean_inverse`)/d ln u of gaps that all grow alike, at constant contact area; from 0 to 1.
+
+    Parameters
+    ----------
+    u, area, jump, h_rms, eta : array_like
+        As for `mean_inverse`.
+
+    Examples
+    --------
+    >>> from mbma_tables.quantities.gas import exponent_of_gap
+    >>> f"{exponent_of_gap(2.0, 0.02, 0.3, 1.0):.2f}"  # u/(u + M) is 0.87
+    '0.72'
+    """
+
+    def exponent(density: FloatArray, g: FloatArray, distance: FloatArray) -> FloatArray:
+        inverse = density / (g + distance)
+        falling = (inverse * g / (g + distance)).sum(axis=-1)
+        slope: FloatArray = falling / inverse.sum(axis=-1)
+        return slope
+
+    return _over_gaps(exponent, *rows(u, area, jump, h_rms, eta))
+
+
+def _over_gaps(
+    reduce: Callable[[FloatArray, FloatArray, FloatArray], FloatArray],
+    columns: FloatArray,
+    shape: tuple[int, ...],
+) -> FloatArray:
+    """A function of the shares of gaps, the gaps and the temperature jump, block by block of contacts."""
+    reduced = np.empty(columns.shape[1])
 
     def fill(some: slice) -> None:
         gap, share, distance, height, cap = columns[:, some]
         density, g = open_gaps(gap, share, height, cap)
-        mean[some] = (density / (g + distance[:, None])).sum(axis=-1)
+        reduced[some] = reduce(density, g, distance[:, None])
 
-    in_blocks(fill, mean.size, BLOCK)
-    return mean.reshape(shape)
+    in_blocks(fill, reduced.size, BLOCK)
+    return reduced.reshape(shape)
+
+
+def scatter_of_mean(area: ArrayLike, jump: ArrayLike, h_rms: ArrayLike) -> FloatArray:
+    """Standard deviation of ln(`mean_inverse`) against simulations, of contacts whose u and A/A0 are known.
+
+    Parameters
+    ----------
+    area, jump, h_rms : array_like
+        As for `mean_inverse`.
+
+    Returns
+    -------
+    ndarray
+        NaN where there was no comparison: of jumps below 0.03 h_rms, and of areas outside
+        0.1% to 75%. Of jumps above 3 h_rms, where 1/(g + M) depends less on the gaps, that
+        at 3 h_rms.
+
+    Examples
+    --------
+    >>> from mbma_tables.quantities.gas import scatter_of_mean
+    >>> scatter_of_mean([0.02, 0.02, 1e-5], 0.3, 1.0).tolist()
+    [0.019, 0.019, nan]
+    """
+    share, over_h_rms = np.broadcast_arrays(area, np.asarray(jump) / np.asarray(h_rms))
+    compared = (over_h_rms >= JUMPS[0]) & (share >= AREAS[0]) & (share <= AREAS[1])
+    logarithm = np.interp(np.log(over_h_rms), np.log(JUMPS), np.log(ERRORS))
+    scatter: FloatArray = np.where(compared, np.exp(logarithm), np.nan)
+    return scatter
 
 
 def open_gaps(

@@ -95,14 +95,14 @@ class ContactQuantities:
         return value
 
     @property
-    def conductance(self) -> Numbers:
+    def solid_conductance(self) -> Numbers:
         """Thermal or electrical conductance of the solid spots, h = (k_s/E*) (-dF/du), at constant contact area.
 
         Conductance and stiffness solve the same potential problem (J. R. Barber, Proc. R. Soc. A
         459 (2003) 53). In W/(m^2 K) for conductivities such as "45 W/(m K)", in S/m^2 for "6e6 S/m".
         The slope of the loading curve of yielded contacts is up to ten times smaller.
         """
-        value: Numbers = self.quantity("conductance")
+        value: Numbers = self.quantity("solid_conductance")
         return value
 
     @property
@@ -115,6 +115,38 @@ class ContactQuantities:
     def total_conductance(self) -> Numbers:
         """Thermal conductance of the solid spots and of the gas in parallel [W/(m^2 K)]."""
         value: Numbers = self.quantity("total_conductance")
+        return value
+
+    @property
+    def solid_conductance_scatter(self) -> Numbers:
+        """Model uncertainty, one standard deviation of ln `solid_conductance` at this pressure.
+
+        That of the unloading stiffness, to which the conductance is proportional. The
+        uncertainty of the conductivities is not included.
+        """
+        value: Numbers = self.quantity("solid_conductance_scatter")
+        return value
+
+    @property
+    def gas_conductance_scatter(self) -> Numbers:
+        """Model uncertainty, one standard deviation of ln `gas_conductance` at this pressure; 0 in vacuum.
+
+        That of the distribution of gaps, by simulations with known mean gap and area, and that
+        of the mean gap (`separation_scatter`), in quadrature. NaN where no simulation was
+        compared: of areas outside 0.1% to 75%, and temperature jumps below 0.03 h_rms. The
+        uncertainty of the gas's conductivity and accommodation is not included.
+        """
+        value: Numbers = self.quantity("gas_conductance_scatter")
+        return value
+
+    @property
+    def total_conductance_scatter(self) -> Numbers:
+        """Model uncertainty, one standard deviation of ln `total_conductance` at this pressure.
+
+        Those of `solid_conductance` and `gas_conductance`, each times its share of the total, in
+        quadrature.
+        """
+        value: Numbers = self.quantity("total_conductance_scatter")
         return value
 
     @property
@@ -159,7 +191,7 @@ class ContactQuantities:
 
         NaN where a hardness is given: the slope of the loading curve of contacts that yield was
         not compared with simulations; `unloading_stiffness_scatter` is that of their unloading
-        stiffness and conductance.
+        stiffness.
         """
         value: Numbers = self.quantity("stiffness_scatter")
         return value
@@ -168,7 +200,7 @@ class ContactQuantities:
     def unloading_stiffness_scatter(self) -> Numbers:
         """Model uncertainty, one standard deviation of ln `unloading_stiffness` at this pressure.
 
-        Also of the conductance and of the tangential stiffness, which are proportional to it.
+        Also of the solid conductance and of the tangential stiffness, which are proportional to it.
         Without a hardness both stiffnesses are the same, and so are their uncertainties.
         """
         value: Numbers = self.quantity("unloading_stiffness_scatter")
@@ -295,7 +327,7 @@ class LawQuantities:
         value: Numbers = contact.quantity("tangential_stiffness")
         return value
 
-    def conductance(
+    def solid_conductance(
         self: Any,
         mean_separation: ArrayLike | str | None = None,
         *,
@@ -312,7 +344,7 @@ class LawQuantities:
         contact = self.at(
             mean_separation, separation=separation, pressure=pressure, area=area
         )
-        value: Numbers = contact.quantity("conductance")
+        value: Numbers = contact.quantity("solid_conductance")
         return value
 
     def gas_conductance(
@@ -343,6 +375,65 @@ class LawQuantities:
             mean_separation, separation=separation, pressure=pressure, area=area
         )
         value: Numbers = contact.quantity("total_conductance")
+        return value
+
+    def solid_conductance_scatter(
+        self: Any,
+        mean_separation: ArrayLike | str | None = None,
+        *,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
+    ) -> Numbers:
+        """Model uncertainty, one standard deviation of ln `solid_conductance` at this pressure.
+
+        That of the unloading stiffness, to which the conductance is proportional. The
+        uncertainty of the conductivities is not included.
+        """
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
+        value: Numbers = contact.quantity("solid_conductance_scatter")
+        return value
+
+    def gas_conductance_scatter(
+        self: Any,
+        mean_separation: ArrayLike | str | None = None,
+        *,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
+    ) -> Numbers:
+        """Model uncertainty, one standard deviation of ln `gas_conductance` at this pressure; 0 in vacuum.
+
+        That of the distribution of gaps, by simulations with known mean gap and area, and that
+        of the mean gap (`separation_scatter`), in quadrature. NaN where no simulation was
+        compared: of areas outside 0.1% to 75%, and temperature jumps below 0.03 h_rms. The
+        uncertainty of the gas's conductivity and accommodation is not included.
+        """
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
+        value: Numbers = contact.quantity("gas_conductance_scatter")
+        return value
+
+    def total_conductance_scatter(
+        self: Any,
+        mean_separation: ArrayLike | str | None = None,
+        *,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
+    ) -> Numbers:
+        """Model uncertainty, one standard deviation of ln `total_conductance` at this pressure.
+
+        Those of `solid_conductance` and `gas_conductance`, each times its share of the total, in
+        quadrature.
+        """
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
+        value: Numbers = contact.quantity("total_conductance_scatter")
         return value
 
     def flow_coefficient(
@@ -432,7 +523,7 @@ class LawQuantities:
 
         NaN where a hardness is given: the slope of the loading curve of contacts that yield was
         not compared with simulations; `unloading_stiffness_scatter` is that of their unloading
-        stiffness and conductance.
+        stiffness.
         """
         contact = self.at(
             mean_separation, separation=separation, pressure=pressure, area=area
@@ -450,7 +541,7 @@ class LawQuantities:
     ) -> Numbers:
         """Model uncertainty, one standard deviation of ln `unloading_stiffness` at this pressure.
 
-        Also of the conductance and of the tangential stiffness, which are proportional to it.
+        Also of the solid conductance and of the tangential stiffness, which are proportional to it.
         Without a hardness both stiffnesses are the same, and so are their uncertainties.
         """
         contact = self.at(
@@ -553,14 +644,14 @@ class JointQuantities:
         value: Numbers = self.at_pressure(pressure).quantity("energy")
         return value
 
-    def conductance(self: Any, pressure: ArrayLike | str) -> Numbers:
+    def solid_conductance(self: Any, pressure: ArrayLike | str) -> Numbers:
         """Thermal or electrical conductance of the solid spots, h = (k_s/E*) (-dF/du), at constant contact area.
 
         Conductance and stiffness solve the same potential problem (J. R. Barber, Proc. R. Soc. A
         459 (2003) 53). In W/(m^2 K) for conductivities such as "45 W/(m K)", in S/m^2 for "6e6 S/m".
         The slope of the loading curve of yielded contacts is up to ten times smaller.
         """
-        value: Numbers = self.at_pressure(pressure).quantity("conductance")
+        value: Numbers = self.at_pressure(pressure).quantity("solid_conductance")
         return value
 
     def gas_conductance(self: Any, pressure: ArrayLike | str) -> Numbers:
@@ -571,6 +662,35 @@ class JointQuantities:
     def total_conductance(self: Any, pressure: ArrayLike | str) -> Numbers:
         """Thermal conductance of the solid spots and of the gas in parallel [W/(m^2 K)]."""
         value: Numbers = self.at_pressure(pressure).quantity("total_conductance")
+        return value
+
+    def solid_conductance_scatter(self: Any, pressure: ArrayLike | str) -> Numbers:
+        """Model uncertainty, one standard deviation of ln `solid_conductance` at this pressure.
+
+        That of the unloading stiffness, to which the conductance is proportional. The
+        uncertainty of the conductivities is not included.
+        """
+        value: Numbers = self.at_pressure(pressure).quantity("solid_conductance_scatter")
+        return value
+
+    def gas_conductance_scatter(self: Any, pressure: ArrayLike | str) -> Numbers:
+        """Model uncertainty, one standard deviation of ln `gas_conductance` at this pressure; 0 in vacuum.
+
+        That of the distribution of gaps, by simulations with known mean gap and area, and that
+        of the mean gap (`separation_scatter`), in quadrature. NaN where no simulation was
+        compared: of areas outside 0.1% to 75%, and temperature jumps below 0.03 h_rms. The
+        uncertainty of the gas's conductivity and accommodation is not included.
+        """
+        value: Numbers = self.at_pressure(pressure).quantity("gas_conductance_scatter")
+        return value
+
+    def total_conductance_scatter(self: Any, pressure: ArrayLike | str) -> Numbers:
+        """Model uncertainty, one standard deviation of ln `total_conductance` at this pressure.
+
+        Those of `solid_conductance` and `gas_conductance`, each times its share of the total, in
+        quadrature.
+        """
+        value: Numbers = self.at_pressure(pressure).quantity("total_conductance_scatter")
         return value
 
     def flow_coefficient(self: Any, pressure: ArrayLike | str) -> Numbers:
@@ -608,7 +728,7 @@ class JointQuantities:
 
         NaN where a hardness is given: the slope of the loading curve of contacts that yield was
         not compared with simulations; `unloading_stiffness_scatter` is that of their unloading
-        stiffness and conductance.
+        stiffness.
         """
         value: Numbers = self.at_pressure(pressure).quantity("stiffness_scatter")
         return value
@@ -616,7 +736,7 @@ class JointQuantities:
     def unloading_stiffness_scatter(self: Any, pressure: ArrayLike | str) -> Numbers:
         """Model uncertainty, one standard deviation of ln `unloading_stiffness` at this pressure.
 
-        Also of the conductance and of the tangential stiffness, which are proportional to it.
+        Also of the solid conductance and of the tangential stiffness, which are proportional to it.
         Without a hardness both stiffnesses are the same, and so are their uncertainties.
         """
         value: Numbers = self.at_pressure(pressure).quantity("unloading_stiffness_scatter")

@@ -51,7 +51,7 @@ def stiffness_scatter(contact: State) -> Any:
 
     NaN where a hardness is given: the slope of the loading curve of contacts that yield was
     not compared with simulations; `unloading_stiffness_scatter` is that of their unloading
-    stiffness and conductance.
+    stiffness.
     """
     return scatter_of_theory(contact, "stiffness")
 
@@ -64,7 +64,7 @@ def stiffness_scatter(contact: State) -> Any:
 def unloading_stiffness_scatter(contact: State) -> Any:
     """Model uncertainty, one standard deviation of ln `unloading_stiffness` at this pressure.
 
-    Also of the conductance and of the tangential stiffness, which are proportional to it.
+    Also of the solid conductance and of the tangential stiffness, which are proportional to it.
     Without a hardness both stiffnesses are the same, and so are their uncertainties.
     """
     return scatter_of_theory(

@@ -395,7 +395,7 @@ class _Planner:
         outputs = self.problem.outputs
         requirements = {
             "inverse": self.problem.prescribed in INVERTED,
-            "slopes": bool(outputs & {"stiffness", "conductance"}),
+            "slopes": bool(outputs & {"stiffness", "solid_conductance"}),
             "energy": "energy" in outputs,
             "yield": "yield" in outputs,
         }

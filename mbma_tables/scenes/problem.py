@@ -30,7 +30,7 @@ OF_CONTACT = (
     "area",
     "stiffness",
     "energy",
-    "conductance",
+    "solid_conductance",
     "leakage",
     "validity",
     "yield",
@@ -49,7 +49,7 @@ DEFAULT_RTOL = 1e-6  # of MBMA
 DEFAULT_RTOL_OF_OTHERS = 1e-4  # of theories without a certified table
 NEEDS = {  # what an effect needs and no other uses
     "yield": ("hardness", "the largest pressure that the softer body bears"),
-    "conductance": ("conductivities", "k1 and k2 of the two bodies"),
+    "solid_conductance": ("conductivities", "k1 and k2 of the two bodies"),
     "pressure_profile": ("deltas", "the approaches of the islands"),
     "comparison": ("theories", f"one or more of {', '.join(THEORIES)}"),
 }

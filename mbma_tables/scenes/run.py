@@ -116,8 +116,8 @@ def _keep_quantities(run: Run, pressed: Contact) -> None:
     if "yield" in requested:
         names += YIELDED
     run.keep({name: getattr(pressed, name) for name in names})
-    if "conductance" in requested:
-        run.keep({"conductance": pressed.conductance})
+    if "solid_conductance" in requested:
+        run.keep({"solid_conductance": pressed.solid_conductance})
     if "leakage" in requested:
         leakage = pressed.leakage
         run.keep(
@@ -146,7 +146,7 @@ def _amplification(run: Run, theory: Mbma) -> float:
     h_max = float(run.surface.h_max)
     gap = run.gap[run.gap < h_max]
     is_inverted = problem.prescribed in INVERTED
-    needs_slopes = bool(problem.outputs & {"stiffness", "conductance"})
+    needs_slopes = bool(problem.outputs & {"stiffness", "solid_conductance"})
     if not gap.size or not (needs_slopes or is_inverted):
         return 1.0
     totals = theory.totals(run.surface, gap, slopes=True)
@@ -425,7 +425,10 @@ def _units(problem: Problem) -> dict[str, tuple[str, str]]:
     units = {}
     for name, (same_unit, meaning) in quantities.items():
         units[name] = (unit_of(same_unit, problem.units), meaning)
-    units["conductance"] = (problem.conductance_unit, "conductance per nominal area")
+    units["solid_conductance"] = (
+        problem.conductance_unit,
+        "conductance per nominal area",
+    )
     return units
 
 

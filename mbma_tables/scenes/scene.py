@@ -54,7 +54,7 @@ class Scene(Problem):
         One of `mbma_tables.theories.THEORIES` or an object, as for `contact`. Refinements,
         island model and variant are MBMA's.
     conductivities : pair of float or str, optional
-        Of the two bodies, thermal or electrical, for "conductance", as for `Contact.conductance`.
+        Of the two bodies, thermal or electrical, for "solid_conductance", as for `Contact.solid_conductance`.
     deltas : array_like, optional
         Approaches [length] of the islands of "pressure_profile".
     theories : sequence of str
@@ -136,10 +136,10 @@ class Scene(Problem):
             "yield",
         ):
             found |= content.get(name, {})
-        if "conductance" in content:
+        if "solid_conductance" in content:
             found["conductivities"] = (
-                content["conductance"]["k1"],
-                content["conductance"]["k2"],
+                content["solid_conductance"]["k1"],
+                content["solid_conductance"]["k2"],
             )
         return cls(**found)
 

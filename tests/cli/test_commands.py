@@ -470,10 +470,10 @@ def test_conductance_of_one_or_two_bodies():
         answer = json.loads(run(*asked, "--conductivity", given))
         bodies = Bodies("25 MPa", conductivity=conductivities)
         face = contact(surface, bodies, pressure="100 kPa")
-        assert answer["columns"]["conductance"] == pytest.approx(
-            [face.conductance], rel=1e-9
+        assert answer["columns"]["solid_conductance"] == pytest.approx(
+            [face.solid_conductance], rel=1e-9
         )
-        assert answer["units"]["conductance"] == unit
+        assert answer["units"]["solid_conductance"] == unit
     assert "one or two, got 3" in helpers.refused(*asked, "--conductivity", "1,2,3")
 
 

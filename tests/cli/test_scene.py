@@ -25,14 +25,14 @@ def test_run_to_netcdf_and_csv(tmp_path):
     out = tmp_path / "joint.nc"
     assert run("run", JOINT, "--out", out) == ""
     with xarray.open_dataset(out) as found:
-        assert found["conductance"].shape == (4,)
+        assert found["solid_conductance"].shape == (4,)
         assert found.attrs["theory"] == "mbma"
         assert found.attrs["variant"] == "reported"
         assert found.attrs["error"] <= 1e-5
         assert found["nominal_pressure"].attrs["units"] == "Pa"
     out = tmp_path / "joint.csv"
     assert run("run", JOINT, "--out", out) == ""
-    assert "conductance" in out.read_text(encoding="utf-8")
+    assert "solid_conductance" in out.read_text(encoding="utf-8")
 
 
 def test_run_as_table_and_json():

@@ -122,17 +122,19 @@ def test_conductance_is_per_unit_of_length_and_in_SI_of_texts():
         plain = pressed((45.0, 167.0))
         thermal = pressed(texts)
         stiffness = np.asarray(plain.unloading_stiffness) / modulus
-        assert plain.conductance == pytest.approx(k_s * stiffness, rel=1e-14)
-        assert thermal.conductance == pytest.approx(1e6 * k_s * stiffness, rel=1e-14)
-        electrical = pressed("6e7 S/m")
-        assert electrical.conductance == pytest.approx(
-            1e6 * pressed(6e7).conductance, rel=1e-14
+        assert plain.solid_conductance == pytest.approx(k_s * stiffness, rel=1e-14)
+        assert thermal.solid_conductance == pytest.approx(
+            1e6 * k_s * stiffness, rel=1e-14
         )
-        units = [each.units["conductance"] for each in (plain, thermal, electrical)]
+        electrical = pressed("6e7 S/m")
+        assert electrical.solid_conductance == pytest.approx(
+            1e6 * pressed(6e7).solid_conductance, rel=1e-14
+        )
+        units = [each.units["solid_conductance"] for each in (plain, thermal, electrical)]
         assert units == ["conductivity/um", "W/(m^2 K)", "S/m^2"]
     loads = xr.DataArray([10.0, 30.0], dims="load")
     labelled = contact(face, Bodies(MODULUS, conductivity=45.0), pressure=loads)
-    assert labelled.conductance.dims == ("load",)
+    assert labelled.solid_conductance.dims == ("load",)
     for bad, says in (
         ((45.0, "167 W/(m K)"), "got 45.0"),
         ("45 W/K", "texts in one unit such as '45 W/"),
@@ -142,9 +144,11 @@ def test_conductance_is_per_unit_of_length_and_in_SI_of_texts():
         ((45.0, np.nan), "k2 must be finite"),
     ):
         with pytest.raises(InputError, match=re.escape(says)):
-            _ = pressed(bad).conductance
+            _ = pressed(bad).solid_conductance
     with pytest.raises(InputError, match="give the surface its unit"):
-        _ = contact(SURFACE, Bodies(conductivity="45 W/(m K)"), area=0.01).conductance
+        _ = contact(
+            SURFACE, Bodies(conductivity="45 W/(m K)"), area=0.01
+        ).solid_conductance
 
 
 @each
@@ -621,7 +625,7 @@ def test_a_list_of_moduli_is_an_array(hardness):
     for k, (modulus, k_s) in enumerate(zip(moduli, (40.0, 60.0), strict=True)):
         one = Bodies(modulus, hardness=hardness, nu=0.3, conductivity=k_s)
         single = contact(SURFACE, one, pressure=0.01, theory="calibrated")
-        names = ["area", "stiffness", "conductance", "scatter"]
+        names = ["area", "stiffness", "solid_conductance", "scatter"]
         names += [] if hardness is None else ["psi", "yielded"]
         for name in names:
             assert getattr(of_list, name)[k] == pytest.approx(getattr(single, name))
@@ -667,14 +671,16 @@ def test_labels_of_conductivities_and_of_a_gas_are_kept():
     bodies = Bodies("100 GPa", conductivity=k)
     for asked in (pressures, 0.01):
         pressed = contact(face, bodies, pressure=asked, theory="calibrated")
-        assert set(pressed.conductance.dims) == {"k"} | set(getattr(asked, "dims", ()))
+        assert set(pressed.solid_conductance.dims) == {"k"} | set(
+            getattr(asked, "dims", ())
+        )
     pressed = contact(face, bodies, pressure=pressures, theory="calibrated")
-    table = pressed.conductance.transpose("k", "p").values
+    table = pressed.solid_conductance.transpose("k", "p").values
     for i, k_s in enumerate(k.values):
         plain = Bodies("100 GPa", conductivity=k_s)
         for j, pressure in enumerate(pressures.values):
             one = contact(face, plain, pressure=pressure, theory="calibrated")
-            assert table[i, j] == pytest.approx(one.conductance, rel=1e-12)
+            assert table[i, j] == pytest.approx(one.solid_conductance, rel=1e-12)
     T = xr.DataArray([300.0, 400.0], dims="T")
     of_gas = pressed.gap_conductance("air", T)
     assert set(of_gas.dims) == {"p", "T"}

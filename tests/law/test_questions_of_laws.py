@@ -36,7 +36,7 @@ METHODS = (
     "separation",
     "mean_separation",
     "unloading_stiffness",
-    "conductance",
+    "solid_conductance",
     "leakage",
     "slope_error",
     "pressure_and_stiffness",

@@ -34,7 +34,7 @@ def test_a_declared_quantity_shows_in_contacts_laws_joints_datasets_and_commands
 ):
     pressures = ["10 MPa", "50 MPa"]
     pressed = contact(FACE, METALS, pressure=pressures, theory="calibrated")
-    seconds = LAYER / pressed.conductance
+    seconds = LAYER / pressed.solid_conductance
     np.testing.assert_allclose(pressed.thermal_time, seconds, rtol=1e-14)
     assert pressed.units["thermal_time"] == "s"
     np.testing.assert_array_equal(
@@ -81,7 +81,7 @@ def test_a_declared_quantity_shows_in_contacts_laws_joints_datasets_and_commands
     answer = CliRunner().invoke(main, words, catch_exceptions=False)
     assert answer.exit_code == 0, answer.output
     report = json.loads(answer.output)
-    conductance = report["columns"]["conductance"][0]
+    conductance = report["columns"]["solid_conductance"][0]
     assert report["columns"]["thermal_time"][0] == pytest.approx(
         LAYER / conductance, rel=1e-12
     )
@@ -134,6 +134,6 @@ def test_bodies_are_what_people_type():
     assert numbers.area == same.area
     metals = contact(FACE, METALS, pressure="10 MPa", theory="calibrated")
     same = contact(FACE, Bodies(metals=METALS), pressure="10 MPa", theory="calibrated")
-    assert metals.conductance == same.conductance
+    assert metals.solid_conductance == same.solid_conductance
     with pytest.raises(InputError, match="give one of them"):
         Bodies("100 GPa", metals="silver")

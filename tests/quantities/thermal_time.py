@@ -12,8 +12,8 @@ THICKNESS = 1e-3  # [m]
     Dimension(time=1),
     "time in which a layer of 1 mm reaches the other body's temperature",
     needs=(CONDUCTIVITY,),
-    uncertainty="unloading_stiffness_scatter",
+    uncertainty="solid_conductance_scatter",
 )
 def thermal_time(contact):
     """Heat capacity of the layer over the conductance [s]."""
-    return HEAT_CAPACITY * THICKNESS / contact.conductance
+    return HEAT_CAPACITY * THICKNESS / contact.solid_conductance

@@ -84,8 +84,8 @@ MISTAKES = [
         scene(surface='hurst = 0.8\nq0 = "0.1/mm"\nzeta_1 = 50\nh_rms = 0.8\nh_max = 3'),
         "h_rms, h_max without a unit",
     ),
-    (scene(effects='on = ["conductance"]'), "needs conductivities"),
-    (scene("[conductance]\nk1 = 1.0\nk2 = 1.0"), "add it to the effects"),
+    (scene(effects='on = ["solid_conductance"]'), "needs conductivities"),
+    (scene("[solid_conductance]\nk1 = 1.0\nk2 = 1.0"), "add it to the effects"),
     (scene(effects='on = ["pressure_profile"]', at=None), "needs deltas"),
     (
         scene('surface = "concrete"', surface=None),

@@ -36,7 +36,7 @@ CONCRETE = Surface.named("concrete")
 GAPS = (0.2, 0.5, 0.9)
 PARTS = {
     "yield": {"hardness": 0.1},
-    "conductance": {"conductivities": (1.0, 3.0)},
+    "solid_conductance": {"conductivities": (1.0, 3.0)},
     "pressure_profile": {"deltas": [0.1]},
     "comparison": {"theories": ("greenwood_williamson",)},
 }
@@ -75,7 +75,7 @@ def test_pressures_stiffness_and_energy(rtol):
     pressures = exact.pressure(separation=np.array(GAPS))
     more = {"pressures": pressures, "E_star": 2.0, "rtol": rtol, "theory": "mbma"}
     found = scene_of(
-        "pressure", "area", "stiffness", "energy", "conductance", **more
+        "pressure", "area", "stiffness", "energy", "solid_conductance", **more
     ).run()
     np.testing.assert_allclose(
         found["area"], exact.area(separation=np.array(GAPS)), rtol=rtol
@@ -90,7 +90,9 @@ def test_pressures_stiffness_and_energy(rtol):
     ]
     slope = (ends[1] - ends[0]) / h  # by u, which moves half as far
     np.testing.assert_allclose(found["stiffness"], slope, rtol=rtol + 2e-6)
-    np.testing.assert_allclose(found["conductance"], 1.5 / 2 * slope, rtol=rtol + 2e-6)
+    np.testing.assert_allclose(
+        found["solid_conductance"], 1.5 / 2 * slope, rtol=rtol + 2e-6
+    )
     for gap, energy in zip(GAPS, found["energy"].values, strict=True):
         assert energy == pytest.approx(
             quad(lambda d: exact.pressure(separation=d), gap, exact.h_max, epsrel=1e-9)[0]
@@ -372,7 +374,7 @@ test_contradictions = refusals(
         },
         "pressure_profile is that of the deformed sphere",
     ),
-    ({"effects": ("conductance",), "conductivities": (1.0, -2.0)}, "positive"),
+    ({"effects": ("solid_conductance",), "conductivities": (1.0, -2.0)}, "positive"),
     (
         {"effects": ("pressure_profile",), "deltas": (0.1,)},
         "are not needed by any effect",

@@ -13,7 +13,7 @@ from mbma_tables.theories import THEORIES
 CONCRETE = Surface.named("concrete")
 MODULUS = 13.3
 PRESSURES = [0.01, 0.1]
-QUANTITIES = ("pressure", "area", "stiffness", "energy", "conductance")
+QUANTITIES = ("pressure", "area", "stiffness", "energy", "solid_conductance")
 each = pytest.mark.parametrize("theory", THEORIES)
 
 
@@ -37,7 +37,7 @@ def test_quantities_at_a_pressure_are_the_contacts(theory):
         "area": truth.area,
         "stiffness": truth.stiffness,
         "energy": truth.energy,
-        "conductance": 1.5 / MODULUS * truth.stiffness,
+        "solid_conductance": 1.5 / MODULUS * truth.stiffness,
         "nominal_pressure": PRESSURES,
     }
     for name, values in expected.items():
@@ -134,7 +134,7 @@ PRESSED = {"surface": SURFACE, "pressures": [1.0, 30.0], "E_star": 100e3}
 
 @pytest.mark.parametrize("theory", ["calibrated", "mbma"])
 def test_a_scene_yields_as_contact_does(theory):
-    effects = ["pressure", "area", "stiffness", "conductance", "validity", "yield"]
+    effects = ["pressure", "area", "stiffness", "solid_conductance", "validity", "yield"]
     scene = Scene(
         **PRESSED,
         effects=effects,
@@ -163,12 +163,12 @@ def test_a_scene_yields_as_contact_does(theory):
     assert found.attrs["psi"] == pytest.approx(known.psi)
     assert found.stiffness.values == pytest.approx(known.stiffness, rel=1e-6)
     own = mean_conductivity(16.0, 167.0) / 100e3 * known.unloading_stiffness
-    assert found.conductance.values == pytest.approx(own, rel=1e-6)
+    assert found.solid_conductance.values == pytest.approx(own, rel=1e-6)
     assert found.separation_scatter.values == pytest.approx(
         known.separation_scatter, rel=1e-6
     )
     assert (
-        found.conductance.values
+        found.solid_conductance.values
         > 1.05 * mean_conductivity(16.0, 167.0) / 100e3 * known.stiffness
     ).all()
 
@@ -203,9 +203,9 @@ def test_a_file_may_call_for_it():
         },
         "material": {"E_star": "100 GPa"},
         "theory": "calibrated",
-        "effects": {"on": ["area", "yield", "conductance"]},
+        "effects": {"on": ["area", "yield", "solid_conductance"]},
         "yield": {"hardness": "1500 MPa"},
-        "conductance": {"k1": "16 W/(m K)", "k2": "167 W/(m K)"},
+        "solid_conductance": {"k1": "16 W/(m K)", "k2": "167 W/(m K)"},
         "prescribed": {"pressures": ["30 MPa"]},
     }
     found = Scene.from_mapping(content).run()
@@ -217,8 +217,10 @@ def test_a_file_may_call_for_it():
     )
     assert found.area.values == pytest.approx([known.area], rel=1e-9)
     assert found.unloading_stiffness.units == "GPa/um"
-    assert found.conductance.units == "W/(m^2 K)"
-    assert found.conductance.values == pytest.approx([1e6 * known.conductance], rel=1e-9)
+    assert found.solid_conductance.units == "W/(m^2 K)"
+    assert found.solid_conductance.values == pytest.approx(
+        [1e6 * known.solid_conductance], rel=1e-9
+    )
 
 
 test_what_contradicts = refusals(
