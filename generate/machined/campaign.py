@@ -205,7 +205,7 @@ def yielded(part: Part) -> dict[str, FloatArray]:
         slope[k] = simulated.stiffness
         # the law of hardness
         law = Yielding(FULL.of(surface), hardness)
-        u, lighter = law.pressed(surface, force[k])
+        u, lighter = law.at_force(surface, force[k])
         loaded = law.loaded(surface, u, lighter)
         answers[2, :, k] = (
             loaded.answer.area,

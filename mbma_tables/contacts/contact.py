@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,12 +28,11 @@ from mbma_tables.quantities.interface import NOTHING_BETWEEN, Interface
 from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
 from mbma_tables.theories import THEORIES, default_theory, get_theory, theory_name
 from mbma_tables.theories.base import (
+    Solved,
     Theory,
-    TheoryAnswer,
     UserTheory,
     require_domain,
 )
-from mbma_tables.theories.mbma.theory import Mbma
 
 # what a theory gives at once; the other quantities follow
 ANSWERED = ("separation", "mean_separation", "pressure", "area", "error")
@@ -139,8 +138,14 @@ def contact_of(
     )
     if any_labelled(surface, question.value, in_units.E_star, in_units.hardness):
         return _of_labelled(setup, question)
-    solved = _solved(setup, surface, question, in_units.E_star, in_units.hardness)
-    return Contact(setup, solved.values, solved.islands, solved.answer, solved.loaded)
+    solved, gaps = _solved(setup, surface, question, in_units.E_star, in_units.hardness)
+    values = {
+        "pressure": solved.pressure,
+        "area": solved.area,
+        "error": solved.error,
+        **gaps,
+    }
+    return Contact(setup, values, solved.islands, solved.answer, solved.loaded)
 
 
 def chosen_theory(
@@ -155,23 +160,17 @@ def chosen_theory(
     return get_theory(name_or_theory, surface)
 
 
-class Solved(NamedTuple):
-    """A contact of plain arrays: the quantities in `ANSWERED`, and what the theory gave beside them."""
-
-    values: dict[str, Any]
-    islands: int | None
-    answer: TheoryAnswer | None
-    loaded: Any
-
-
 def _solved(
     setup: Setup,
     surface: AnySurface,
     question: Question,
     E_star: Any,
     hardness: Any,
-) -> Solved:
-    """The contact of plain arrays at a given quantity; modulus and hardness are checked already."""
+) -> tuple[Solved, dict[str, Any]]:
+    """The contact of plain arrays at a given quantity, and its separations.
+
+    Modulus and hardness are checked already.
+    """
     modulus = np.asarray(E_star)
     cap = np.asarray(hardness if setup.bodies.yields else np.inf)
     shape = broadcast_shape(
@@ -184,40 +183,24 @@ def _solved(
     )
     question = Question(question.name, spread(question.value, shape))
     modulus = spread(modulus, shape)
-    theory: Any = setup.theory
+    theory = setup.theory
     if setup.bodies.yields:
         theory = theory.with_hardness(cap, modulus)
     gaps, lighter = _separations(setup, theory, surface, question, modulus, cap)
-    if isinstance(theory, Mbma):
-        totals = theory.totals(surface, gaps["separation"], modulus)
-        values = {
-            "pressure": totals.pressure,
-            "area": totals.area,
-            "error": totals.error,
-            **gaps,
-        }
-        return Solved(values, totals.islands, None, None)
+    d = np.asarray(gaps["separation"])
     u = np.asarray(gaps["mean_separation"])
-    loaded = theory.loaded(surface, u, lighter) if setup.bodies.yields else None
-    answer = theory.answer(surface, u) if loaded is None else loaded.answer
-    values = {
-        "pressure": (modulus * answer.pressure)[()],
-        "area": answer.area[()],
-        "error": spread(answer.error, np.shape(answer.pressure))[()],
-        **gaps,
-    }
-    return Solved(values, None, answer, loaded)
+    return theory.solved(surface, d, u, modulus, lighter), gaps
 
 
 def _separations(
     setup: Setup,
-    theory: Any,
+    theory: Theory,
     surface: AnySurface,
     question: Question,
     modulus: FloatArray,
     cap: FloatArray,
 ) -> tuple[dict[str, Any], Any]:
-    """Both separations for the given quantity; with a hardness also `lighter` of `Yielding.loaded`."""
+    """Both separations for the given quantity; also `lighter` of `Theory.at_force`."""
     h_max = np.asarray(surface.h_max)
     name = question.name
     gap = question.value
@@ -243,7 +226,7 @@ def _separations(
 
 def _inverted(
     setup: Setup,
-    theory: Any,
+    theory: Theory,
     surface: AnySurface,
     question: Question,
     modulus: FloatArray,
@@ -255,9 +238,8 @@ def _inverted(
     with np.errstate(over="ignore"):  # what is infinite is refused as too large
         wanted = given / modulus if name == "pressure" else given
     try:
-        if name == "pressure" and setup.bodies.yields:
-            pressed: tuple[FloatArray, Any] = theory.pressed(surface, wanted)
-            return pressed
+        if name == "pressure":
+            return theory.at_force(surface, wanted)
         return theory.mean_separation_at(surface, name, wanted), None
     except OutOfRangeError:
         if name == "pressure":
@@ -267,7 +249,7 @@ def _inverted(
 
 def _refuse_pressure(
     setup: Setup,
-    theory: Any,
+    theory: Theory,
     surface: AnySurface,
     given: FloatArray,
     modulus: FloatArray,
@@ -303,8 +285,8 @@ def _of_labelled(setup: Setup, question: Question) -> Contact:
     ) -> tuple[Any, ...]:
         modulus = positive_array("E_star", E_star)
         cap = checked_hardness(hardness)
-        solved = _solved(setup, block, question.of_block(given), modulus, cap)
-        return tuple(solved.values[name] for name in ANSWERED)
+        solved, gaps = _solved(setup, block, question.of_block(given), modulus, cap)
+        return (*gaps.values(), solved.pressure, solved.area, solved.error)
 
     name = question.name
     value = question.value

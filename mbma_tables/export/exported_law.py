@@ -13,7 +13,6 @@ from mbma_tables import __version__
 from mbma_tables.bodies import Bodies
 from mbma_tables.common.arguments import FloatArray, Numbers, number_in
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.files import shipped_file
 from mbma_tables.common.units import factor, in_unit
 from mbma_tables.contacts.contact import chosen_theory, contact
 from mbma_tables.export.text import about, number
@@ -30,7 +29,6 @@ from mbma_tables.rough_body.rough_contact import pressed
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.base import Theory, UserTheory
-from mbma_tables.theories.evidence import NAME
 from mbma_tables.theories.mbma.theory import Mbma
 from mbma_tables.theories.mbma.variants import Variant
 
@@ -194,7 +192,7 @@ class ExportedLaw:
         stress = self.stress
         title = (
             f"MBMA model, variant {law.variant!r}"
-            if law.theory == Mbma.name
+            if law.variant
             else f"theory {law.theory!r}"
         )
         title = f"Contact law of a rough surface, {title}"
@@ -302,12 +300,7 @@ class ExportedLaw:
 
     def _hashes(self) -> Iterator[str]:
         """Lines on the table that the theory uses, and on a surface not given by five numbers."""
-        if isinstance(self.theory, Mbma):
-            from mbma_tables.theories.mbma.tables import universal_model
-
-            yield f"table: data {str(universal_model().content.attributes['values_sha256'])[:16]}"
-        elif self.theory.name == "calibrated":
-            yield f"table: {NAME} {shipped_file(NAME).read_bytes()[-65:-49].decode()}"
+        yield from self.theory.provenance()
         if isinstance(self.surface, MeasuredSurface):
             values = hashlib.sha256(np.stack([self.surface.q, self.surface.C]).tobytes())
             yield f"spectrum: values {values.hexdigest()[:16]}"

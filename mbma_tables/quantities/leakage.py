@@ -48,7 +48,6 @@ from mbma_tables.theories.evidence import (
     nodes_of,
     shipped_part,
 )
-from mbma_tables.theories.mbma.theory import Mbma
 
 GROUP = "leakage"
 AXES = ("hurst", "log_zeta_1", "log_odds")
@@ -333,8 +332,8 @@ def reasons_against(
         found[f"{spectrum}: theory='simulated' has its flow"] = everywhere
     if theory.elastic is not theory is not simulated:
         found["leakage: yielded contacts leak several times more"] = everywhere
-    if isinstance(theory.elastic, Mbma):
-        found["leakage: the mean separation of 'mbma' is wrong by factors"] = everywhere
+    for reason in theory.reasons_of_flow():
+        found[reason] = everywhere
     return found
 
 

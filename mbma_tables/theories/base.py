@@ -13,7 +13,13 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.common.arguments import FloatArray, describe_entries, require, rows
+from mbma_tables.common.arguments import (
+    FloatArray,
+    describe_entries,
+    require,
+    rows,
+    spread,
+)
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import inversion, tested
@@ -31,6 +37,17 @@ class TheoryAnswer(NamedTuple):
     stiffness: FloatArray  # -d(F/(A0 E*))/du [1/length]
     # bound on the relative numerical error of force and area, against the theory itself
     error: FloatArray
+
+
+class Solved(NamedTuple):
+    """Contacts at known gaps, and what the theory found beside them."""
+
+    pressure: Any  # in the unit of the modulus
+    area: Any
+    error: Any
+    answer: TheoryAnswer | None = None
+    islands: int | None = None  # number of islands evaluated
+    loaded: Any = None  # with a hardness, a `theories.yielding.theory.Loaded`
 
 
 class Compression(NamedTuple):
@@ -82,6 +99,18 @@ class Theory(abc.ABC):
     @abc.abstractmethod
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Pressure, area and stiffness at mean separations u [length]."""
+
+    def solved(
+        self,
+        surface: AnySurface,
+        separation: FloatArray,
+        mean_separation: FloatArray,
+        modulus: FloatArray,
+        lighter: Any = None,
+    ) -> Solved:
+        """Contacts at gaps of which both separations are known; `lighter` is that of `at_force`."""
+        answer = self.answer(surface, mean_separation)
+        return solved_by(answer, modulus)
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """Reasons why a measured surface violates the theory's assumptions.
@@ -214,6 +243,14 @@ class Theory(abc.ABC):
         """Curves for the law of one surface to a relative error; None: it is fitted to answers."""
         return None
 
+    def provenance(self) -> tuple[str, ...]:
+        """Lines on the shipped tables that it reads, for the headers of files."""
+        return ()
+
+    def reasons_of_flow(self) -> tuple[str, ...]:
+        """Reasons why flow through its gaps is not valid, whatever the surface."""
+        return ()
+
     def gaps(self) -> Any:
         """Of a simulated map, the theory that knows the flow through its gaps."""
         return None
@@ -261,6 +298,12 @@ class Theory(abc.ABC):
             return curve_values(quantity, pressure, area, stiffness)
 
         return values
+
+    def at_force(
+        self, surface: AnySurface, pressure: FloatArray
+    ) -> tuple[FloatArray, Any]:
+        """Mean separations u at forces over A0 E*, and with them what `solved` can use."""
+        return self.mean_separation_at(surface, "pressure", pressure), None
 
     def mean_separation_at(
         self, surface: AnySurface, quantity: str, wanted: FloatArray
@@ -337,6 +380,17 @@ class Theory(abc.ABC):
                 beyond,
             )
         return np.asarray(wanted >= largest)
+
+
+def solved_by(answer: TheoryAnswer, modulus: FloatArray, loaded: Any = None) -> Solved:
+    """Contacts of an answer over E*, in the unit of the modulus."""
+    return Solved(
+        pressure=(modulus * answer.pressure)[()],
+        area=answer.area[()],
+        error=spread(answer.error, np.shape(answer.pressure))[()],
+        answer=answer,
+        loaded=loaded,
+    )
 
 
 def require_domain(

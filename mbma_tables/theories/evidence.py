@@ -129,6 +129,11 @@ def shipped_part(group: str) -> tuple[dict[str, FloatArray], dict[str, Any]]:
     return read_group(shipped_file(NAME), group)[:2]
 
 
+def shipped_checksum() -> str:
+    """The first digits of the SHA-256 in the last line of the shipped file."""
+    return shipped_file(NAME).read_bytes()[-65:-49].decode()
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Deviations:
     """Distances of theories from simulations, as measured on surfaces that no fit saw."""

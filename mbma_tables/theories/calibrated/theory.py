@@ -24,7 +24,7 @@ from mbma_tables.theories.calibrated.formulas import (
     self_affine_law,
 )
 from mbma_tables.theories.calibrated.formulas import area as law_area
-from mbma_tables.theories.evidence import shipped_deviations
+from mbma_tables.theories.evidence import NAME, shipped_checksum, shipped_deviations
 from mbma_tables.theories.inversion import Curve
 from mbma_tables.theories.tested import TESTED_AREA
 
@@ -181,6 +181,9 @@ class Calibrated(Theory):
             if isinstance(surface, MeasuredSurface)
             else np.zeros_like(high)
         ), high
+
+    def provenance(self) -> tuple[str, ...]:
+        return (f"table: {NAME} {shipped_checksum()}",)
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length]; without bound at u = 0."""

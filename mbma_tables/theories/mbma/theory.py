@@ -14,6 +14,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories.base import (
     Compression,
+    Solved,
     Theory,
     TheoryAnswer,
     curve_values,
@@ -102,6 +103,18 @@ class Mbma(Theory):
             check_band(surface, self.variant)
         return totals_at(surface, gap, self.sums, E_star, slopes)
 
+    def solved(
+        self,
+        surface: AnySurface,
+        separation: FloatArray,
+        mean_separation: FloatArray,
+        modulus: FloatArray,
+        lighter: Any = None,
+    ) -> Solved:
+        """Totals at separations d, the model's own coordinate, without their slopes."""
+        totals = self.totals(surface, separation, modulus)
+        return Solved(totals.pressure, totals.area, totals.error, islands=totals.islands)
+
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length] from 0 to h_max."""
         u = np.asarray(mean_separation, dtype=float)
@@ -128,7 +141,7 @@ class Mbma(Theory):
         polynomials.
         """
         # the sums over islands are to be ten times as accurate as the polynomials
-        rtol_of_sums = min(max(0.1 * rtol, MIN_RTOL), self.rtol)
+        rtol_of_sums = max(0.1 * rtol, MIN_RTOL)
         model = get_model(self.island_model, rtol_of_sums, self.variant)
         h_max = float(surface.h_max)
         h_rms = float(surface.h_rms)
@@ -213,6 +226,15 @@ class Mbma(Theory):
         NaN where it does not.
         """
         return self._maximum(surface, "stiffness", np.full(surface.shape, np.nan))
+
+    def provenance(self) -> tuple[str, ...]:
+        content = getattr(self.sums.model, "content", None)
+        if content is None:
+            return (f"island model: {self.island_model_name}",)
+        return (f"table: data {str(content.attributes['values_sha256'])[:16]}",)
+
+    def reasons_of_flow(self) -> tuple[str, ...]:
+        return ("leakage: the mean separation of 'mbma' is wrong by factors",)
 
     def scatter_name(self, surface: AnySurface) -> str:
         """Scatter of the variant: only the named ones were compared with boundary elements."""

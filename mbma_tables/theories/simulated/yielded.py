@@ -164,7 +164,7 @@ class Saturated(Yielding):
         found = self._each(ask, mean_separation)
         return Loaded(TheoryAnswer(*found[:4]), *found[4:])
 
-    def pressed(
+    def at_force(
         self, surface: AnySurface, pressure: FloatArray
     ) -> tuple[FloatArray, None]:
         """Mean separations u at forces over A0 E*."""

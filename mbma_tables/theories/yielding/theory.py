@@ -14,7 +14,7 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories.base import Theory, TheoryAnswer, unfinished
+from mbma_tables.theories.base import Solved, Theory, TheoryAnswer, solved_by, unfinished
 from mbma_tables.theories.evidence import known_at, shipped_part
 from mbma_tables.theories.inversion import FEW_LOOKS, Curve
 from mbma_tables.theories.yielding import formulas as law
@@ -188,6 +188,26 @@ class Yielding(Theory):
         """Force, area and the loading curve's stiffness at mean separations u [length]."""
         return self.loaded(surface, mean_separation).answer
 
+    def solved(
+        self,
+        surface: AnySurface,
+        separation: FloatArray,
+        mean_separation: FloatArray,
+        modulus: FloatArray,
+        lighter: Any = None,
+    ) -> Solved:
+        """Contacts at gaps; `lighter` are those of the elastic contact at the same forces."""
+        loaded = self.loaded(surface, mean_separation, lighter)
+        return solved_by(loaded.answer, modulus, loaded)
+
+    def provenance(self) -> tuple[str, ...]:
+        lines: tuple[str, ...] = self.elastic.provenance()
+        return lines
+
+    def reasons_of_flow(self) -> tuple[str, ...]:
+        reasons: tuple[str, ...] = self.elastic.reasons_of_flow()
+        return reasons
+
     def loaded(
         self,
         surface: AnySurface,
@@ -306,7 +326,7 @@ class Yielding(Theory):
     def gaps(self) -> Any:
         return self.elastic.gaps()
 
-    def pressed(
+    def at_force(
         self, surface: AnySurface, pressure: FloatArray
     ) -> tuple[FloatArray, FloatArray | None]:
         """Mean separations u at forces over A0 E*, and `lighter` of `loaded` where areas need that."""
