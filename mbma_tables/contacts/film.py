@@ -24,7 +24,7 @@ from mbma_tables.theories import OF_MAPS
 from mbma_tables.theories.base import Theory
 from mbma_tables.theories.simulated.own_map import map_of
 from mbma_tables.theories.simulated.reynolds import flow_and_couette
-from mbma_tables.theories.tested import TESTED_AREA
+from mbma_tables.theories.tested import elastic_ranges, untested_areas
 
 RANGE = (0.2, 50.0)  # u/h_rms
 # simulated: A/A0 of the lightest contact, knots of curves in contact and before it, the
@@ -222,7 +222,8 @@ def flow_factors(
     scatter = np.sqrt((OWN if own else OPEN) ** 2 + of_contact**2 + of_lay**2)
     reasons = {text: np.ravel(mask) for text, mask in leak.reasons.items()}
     # the lightest contacts were not simulated, but their flow is nearly that before contact
-    reasons.pop(f"A/A0 is below {TESTED_AREA[0]:g}", None)
+    light, _ = untested_areas(area, elastic_ranges()["area"])
+    reasons.pop(light, None)
     reasons |= {
         f"the lay is longer than {WIDEST_LAY:g} to 1, beyond simulated flow": np.full(
             u.shape, far

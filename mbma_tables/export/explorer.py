@@ -29,7 +29,6 @@ from mbma_tables.theories.evidence import COMPARED, QUANTITIES, shipped_deviatio
 from mbma_tables.theories.mbma import theory as mbma
 from mbma_tables.theories.mbma.tables import universal_model
 from mbma_tables.theories.mbma.variants import FITTED, PRINTED, REPORTED, get_variant
-from mbma_tables.theories.tested import TESTED_AREA
 from mbma_tables.theories.yielding import formulas as hardness_law
 
 MODULE = "explorer.wasm"
@@ -70,6 +69,7 @@ def packed(values: Any) -> dict[str, Any]:
 def _limits() -> dict[str, Any]:
     """Tested ranges of theories, with the texts of `Contact.reasons`, and their scatter."""
     deviations = shipped_deviations()
+    ranges = tested.elastic_ranges()
     return {
         "log_area": deviations.log_area.tolist(),
         "scatter": {
@@ -84,12 +84,12 @@ def _limits() -> dict[str, Any]:
         },
         "gradient": MAX_GRADIENT,
         "mbma_area": mbma.MAX_AREA,
-        "hurst": tested.HURST,
-        "zeta_1": tested.ZETA_1,
+        "hurst": ranges["hurst"][0],
+        "zeta_1": ranges["bandwidth"],
         "broadest": tested.BROADEST,
-        "heights": tested.HEIGHTS,
+        "heights": ranges["heights"],
         "compared": COMPARED,
-        "area": TESTED_AREA,
+        "area": ranges["area"],
         "max_samples": MAX_SAMPLES,
         "hardness": dataclasses.asdict(hardness_law.CONSTANTS),
     }

@@ -31,7 +31,7 @@ from mbma_tables.rough_body.force_law import ForceLaw
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import Theory, UserTheory
 from mbma_tables.theories.mbma.variants import Variant
-from mbma_tables.theories.tested import TESTED_AREA
+from mbma_tables.theories.tested import below, elastic_ranges
 
 FLOWS = {"leakage": 1.0, "hydraulic_aperture": 1 / 3}  # powers of the flow coefficient
 OF_FRICTION = 5  # pressures at which a friction card's comments have the stiffness
@@ -489,7 +489,7 @@ def _film_rows(
     )
     found = at(u)
     middle = at((u[1:] + u[:-1]) / 2)
-    tested = found.pressure[found.area >= TESTED_AREA[0]]
+    tested = found.pressure[~below(found.area, elastic_ranges()["area"])]
     floor = least if least is not None else float(tested.min()) if tested.size else np.inf
     errors = {}  # largest of linear interpolation, in the middle of the intervals
     for name in FILM_NAMES:

@@ -14,7 +14,14 @@ from mbma_tables.common.shared import frozen
 from mbma_tables.core import core
 from mbma_tables.law import block as fit
 from mbma_tables.quantities.effective_medium import wide_gap
-from mbma_tables.quantities.leakage import along, degrees, flow, shipped_flow
+from mbma_tables.quantities.leakage import (
+    along,
+    degrees,
+    flow,
+    shipped_flow,
+    unknown_where_blocked,
+    yields_noticeably,
+)
 from mbma_tables.surfaces.any_surface import AnySurface, apply
 
 # tolerance of the polynomials, or this share of the law's own error
@@ -31,9 +38,9 @@ class LeakageLaw:
 
     law: Any  # the ContactLaw whose area and mean separation it is of
     h_rms: float  # [length]
-    # : mean separation u [length] at and below which contact percolates and nothing flows;
-    # with a hardness the flow is : not known there; -infinity where contact never
-    # percolates
+    #: mean separation u [length] at and below which contact percolates and nothing flows;
+    #: of a contact that yields the flow is not known there; -infinity where contact never
+    #: percolates
     blocked_at: float
     # bound on the polynomials' relative error at the law's area, whose own errors come on
     # top times -d ln k/d ln A
@@ -80,10 +87,14 @@ class LeakageLaw:
         gap = self.law.both_separations("separation", flat[apart])[1]
         found[apart] = gap**3 * wide_gap(gap / self.h_rms)
         # what percolates in the elastic contact is not known to block the yielded one
-        if self.law.hardness < np.inf and not getattr(
+        theory = self.law.setup.theory_of(self.law.setup.bodies)
+        blocked = np.flatnonzero(found == 0)
+        if theory.elastic is not theory and not getattr(
             self.law.gaps, "of_yielded_gaps", False
         ):
-            found[found == 0] = np.nan
+            u = self.law.both_separations("separation", flat[blocked])[1]
+            yields = yields_noticeably(theory, self.law.surface, u)
+            found[blocked] = unknown_where_blocked(found[blocked], yields)
         return found.reshape(np.shape(d))[()]
 
 

@@ -65,6 +65,9 @@ MAP_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39)
 LIKE_GAUSSIAN = (0.29, 0.60, 0.89, 1.9, 6.3)
 OTHERS = (0.84, 1.3, 1.9, 3.0, 7.3)
 SIMULATED = 64.0  # zeta_1 up to which flow was simulated
+# yielded share of the contact up to which its flow is that of the elastic contact: gap and
+# area differ by less than this share, the scatter of flow is at least forty times as large
+NEGLIGIBLE_YIELD = 1e-3
 MEANINGS = {
     "K": "flow coefficient",
     "x": "flow coefficient along the first axis",
@@ -90,14 +93,14 @@ class Leakage(Displayed):
     roughness on both.
     """
 
-    # : flow coefficient [length^3], the cube of the `hydraulic_aperture`; exactly 0 where
-    # `blocked`, and NaN where the : elastic contact at this gap would be blocked but the
-    # contact yields, so that compact patches leave channels
+    #: flow coefficient [length^3], the cube of the `hydraulic_aperture`; exactly 0 where
+    #: `blocked`, and NaN where the elastic contact at this gap would be blocked but the
+    #: contact yields, so that compact patches leave channels
     K: Numbers
     x: Numbers  #: that along the first axis of the map [length^3]
     y: Numbers  #: along the second axis
-    # : flow per width along one axis by a pressure gradient along the other; 0 where
-    # isotropic
+    #: flow per width along one axis by a pressure gradient along the other; 0 where
+    #: isotropic
     xy: Numbers
     _contact: Any = dataclasses.field(repr=False)
 
@@ -127,7 +130,7 @@ class Leakage(Displayed):
 
     blocked = property(
         lambda self: self.K == 0,
-        doc="Whether contact percolates, A/A0 at or above about 0.41.",
+        doc="Whether contact percolates, A/A0 at or above about 0.41; False where K is not known.",
     )
 
     def along(self, direction: ArrayLike | str) -> Any:
@@ -259,24 +262,29 @@ def leakage_of(contact: Any) -> Leakage:
         theory: Theory, surface: Any, u: FloatArray, E: FloatArray, share: FloatArray
     ) -> tuple[FloatArray, ...]:
         simulated = _simulated(theory)
-        yields = theory.elastic is not theory
         if simulated is not None:
             own = np.asarray(simulated.flow(surface, u))
-            own = (
-                unknown_where_blocked(own) if yields and simulated is not theory else own
-            )
+            if simulated is not theory:
+                own = unknown_where_blocked(own, yields_noticeably(theory, surface, u))
             return np.sqrt(own[0]) * np.sqrt(own[1]), *own
         K = flow(surface, u, share) * np.asarray(surface.h_rms) ** 3
-        K = unknown_where_blocked(K) if yields else K
+        K = unknown_where_blocked(K, yields_noticeably(theory, surface, u))
         return K, K, K, np.zeros_like(K)
 
     K, x, y, xy = contact.evaluate(answer, 4, {"area": contact.area})
     return Leakage(K, x, y, xy, contact)
 
 
-def unknown_where_blocked(K: FloatArray) -> FloatArray:
-    """Flow coefficients of a contact that yields, NaN where the elastic contact would be blocked."""
-    return np.where(K == 0, np.nan, K)
+def yields_noticeably(theory: Any, surface: Any, u: FloatArray) -> Any:
+    """Mask of contacts of which more than a negligible share yields; False of an elastic theory."""
+    if theory.elastic is theory:
+        return np.zeros(np.shape(u), bool)
+    return np.asarray(theory.loaded(surface, u).yielded > NEGLIGIBLE_YIELD)
+
+
+def unknown_where_blocked(K: FloatArray, yields: Any) -> FloatArray:
+    """Flow coefficients, NaN where the contact yields and the elastic contact would be blocked."""
+    return np.where((K == 0) & yields, np.nan, K)
 
 
 def _simulated(theory: Theory) -> Any:
@@ -331,7 +339,9 @@ def reasons_against(
         )
         found[f"{spectrum}: theory='simulated' has its flow"] = everywhere
     if theory.elastic is not theory is not simulated:
-        found["leakage: yielded contacts leak several times more"] = everywhere
+        found["leakage: yielded contacts leak several times more"] = yields_noticeably(
+            theory, surface, u
+        )
     for reason in theory.reasons_of_flow():
         found[reason] = everywhere
     return found

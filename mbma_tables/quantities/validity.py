@@ -65,11 +65,20 @@ def reasons_of_contact(
     shape = np.shape(answer.pressure)
     is_steep = np.broadcast_to(np.asarray(surface.rms_gradient) > MAX_GRADIENT, shape)
     everywhere = np.ones(shape, dtype=bool)
+    scatter = theory.scatter(surface, "pressure", answer.area)
+    no_scatter = (
+        f"the model uncertainty of theory {theory.name!r} is not known for such contacts"
+    )
     reasons = {
         "the rms gradient is above 1: are heights and wavenumbers in one unit?": is_steep,
         **dict.fromkeys(theory.elastic.departures(surface), everywhere),
         **theory.reasons(surface, answer, u),
     }
+    # what no simulation was compared with is not tested, whatever else is known of it
+    is_unexplained = np.isnan(scatter) & (answer.area > 0)
+    if is_unexplained.any():
+        explained = np.logical_or.reduce([*reasons.values(), np.zeros(shape, bool)])
+        reasons[no_scatter] = is_unexplained & ~explained
     return reasons | _reasons_of_bodies(contact, theory, surface, E_star, answer)
 
 

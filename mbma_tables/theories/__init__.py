@@ -101,6 +101,11 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
     if isinstance(theory, str) and theory in _NAMED:
         chosen = __getattr__(_NAMED[theory])()
     if isinstance(chosen, Theory):
+        if chosen.elastic is not chosen:
+            raise InputError(
+                f"theory {chosen.name!r} is one with a hardness: a hardness is of the bodies, "
+                "Bodies(..., hardness=...), beside the elastic theory"
+            )
         return chosen
 
     from mbma_tables.theories.simulated.theory import Simulated

@@ -211,7 +211,8 @@ class Theory(abc.ABC):
         self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray
     ) -> Mapping[str, NDArray[np.bool_]]:
         """Reasons why results lie outside the tested range of the theory, each with a mask."""
-        reasons = tested.untested(surface, answer.area)
+        by_heights = self.scatter_name(surface) != self.name
+        reasons = tested.untested(surface, answer.area, by_heights)
         if self.ends_at_h_max:
             return reasons
         beyond = mean_separation > np.asarray(surface.h_max)

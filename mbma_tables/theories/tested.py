@@ -1,67 +1,175 @@
 """Ranges of the simulated surfaces and contacts, outside which no theory is valid.
 
-All theories were compared with the same boundary-element simulations; docs/fidelity.md lists them.
+They are in the shipped file tested.csv, by theory, and for contacts with a hardness apart.
 """
 
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.files import shipped_file
+from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface
 
-TESTED_AREA = (1e-3, 0.97)  # A/A0 that was simulated
-HURST = 0.2  # least Hurst exponent
-ZETA_1 = (8.0, 128.0)  # longest over shortest wavelength
-# h_max/h_rms: simulated up to 5.5, beyond which separation and stiffness change by 0.1% at most from
-# 0.1% contact on
-HEIGHTS = (2.5, 8.0)
 # longest wavelengths along a side of the nominal area from which surfaces of one spectrum differ by
 # the stated scatter; with two, the gap of some is 7-14% off where 2-3% are stated
 SIDE = 4.0
 # longest over shortest wavelength of the broadest surface that was simulated, once
 BROADEST = 256.0
 ROUNDING = 1e-9  # relative, of numbers beside the ends of these ranges
+WITH_HARDNESS = "hardness"
+
+Range = tuple[float, float]
 
 
-def untested(surface: AnySurface, area: FloatArray) -> dict[str, Any]:
-    """Reasons why contacts of these areas A/A0 are outside the simulated range, each with a mask."""
-    reasons = {**_of_the_surface(surface), **_of_the_side(surface)}
-    least, most = TESTED_AREA
-    reasons[f"A/A0 is below {least:g}"] = (area > 0) & (area < least * (1 - ROUNDING))
-    reasons[f"A/A0 is above {most:g}"] = area > most * (1 + ROUNDING)
+@shared()
+def _rows() -> dict[tuple[str, str], dict[str, Range]]:
+    """Ranges by theory and contact, then by quantity, read once."""
+    rows: dict[tuple[str, str], dict[str, Range]] = {}
+    with open(shipped_file("tested.csv"), encoding="utf-8", newline="") as file:
+        lines = (line for line in file if not line.startswith("#"))
+        for row in csv.DictReader(lines):
+            ranges = rows.setdefault((row["theory"], row["contact"]), {})
+            ranges[row["quantity"]] = float(row["least"]), float(row["most"])
+    return rows
+
+
+def elastic_ranges() -> Mapping[str, Range]:
+    """Tested ranges of elastic contacts, which are those of all theories but the ones of maps."""
+    return _rows()["any", "elastic"]
+
+
+def ranges_with_hardness(theory: str) -> Mapping[str, Range]:
+    """Tested ranges of a theory with a hardness; empty where it was not compared."""
+    return _rows().get((theory, WITH_HARDNESS), {})
+
+
+def below(values: Any, limits: Range) -> Any:
+    """Mask of values below a range, but for rounding."""
+    return np.asarray(values) < limits[0] * (1 - ROUNDING)
+
+
+def above(values: Any, limits: Range) -> Any:
+    """Mask of values above a range, but for rounding."""
+    return np.asarray(values) > limits[1] * (1 + ROUNDING)
+
+
+def untested(
+    surface: AnySurface, area: FloatArray, by_heights: bool = False
+) -> dict[str, Any]:
+    """Reasons why contacts of these areas A/A0 are outside the simulated range, each with a mask.
+
+    `by_heights` is of theories that know all heights of a map.
+    """
+    reasons = {**_of_the_surface(surface, by_heights), **_of_the_side(surface)}
+    reasons |= untested_areas(area, elastic_ranges()["area"])
     return {text: np.broadcast_to(mask, np.shape(area)) for text, mask in reasons.items()}
+
+
+def untested_areas(area: FloatArray, limits: Range, kind: str = "") -> dict[str, Any]:
+    """Reasons of areas A/A0 outside a range; `kind` names the contacts that it is of."""
+    return {
+        f"A/A0 is below {limits[0]:g}{kind}": (area > 0) & below(area, limits),
+        f"A/A0 is above {limits[1]:g}{kind}": above(area, limits),
+    }
+
+
+def untested_with_hardness(
+    surface: AnySurface, theory: str, area: FloatArray, eta: FloatArray
+) -> dict[str, Any]:
+    """Reasons why contacts with a hardness were not compared with simulations, each with a mask.
+
+    `theory` is the name under which its scatter is stored, `eta` the hardness over E* times
+    the rms gradient; where it is infinite, the contact is elastic.
+    """
+    shape = np.broadcast_shapes(np.shape(area), np.shape(eta))
+    yields = np.broadcast_to(np.isfinite(eta), shape)
+    ranges = ranges_with_hardness(theory)
+    if not ranges:
+        text = (
+            f"theory {theory!r} was not compared with simulations with a hardness: "
+            "theory='calibrated' was"
+        )
+        return {text: yields}
+    soft = f"the hardness over E* times the rms gradient is below {ranges['eta'][0]:g}"
+    reasons = {soft: below(eta, ranges["eta"])}
+    if "area" in ranges:
+        reasons |= untested_areas(area, ranges["area"], ", with a hardness")
+    if "heights" in ranges:
+        low, high = ranges["heights"]
+        heights = np.asarray(surface.h_max) / np.asarray(surface.h_rms)
+        text = (
+            f"h_max/h_rms is outside {low:g} to {high:g}, where {theory!r} was compared with "
+            "simulations with a hardness"
+        )
+        reasons[text] = below(heights, (low, high)) | above(heights, (low, high))
+    return {text: np.broadcast_to(mask, shape) & yields for text, mask in reasons.items()}
 
 
 def is_compared(surface: AnySurface) -> FloatArray:
     """Mask of surfaces like those whose deviations from simulations are averaged in the scatter."""
+    ranges = elastic_ranges()
+    ratio = bandwidth(surface)
+    broad = above(ratio, (0.0, BROADEST))
     if isinstance(surface, MeasuredSurface):
-        return np.asarray(surface.q1 / surface.longest <= BROADEST * (1 + ROUNDING))
-    hurst = np.asarray(getattr(surface, "hurst", 1.0))
-    ratio = np.asarray(surface.zeta_1)
-    broad = ratio > BROADEST * (1 + ROUNDING)
-    narrow = ratio < ZETA_1[0] * (1 - ROUNDING)
-    return np.asarray(~(broad | narrow | (hurst < HURST * (1 - ROUNDING))))
+        return np.asarray(~broad)
+    low_hurst = below(getattr(surface, "hurst", 1.0), ranges["hurst"])
+    return np.asarray(~(broad | below(ratio, ranges["bandwidth"]) | low_hurst))
 
 
-def _of_the_surface(surface: AnySurface) -> dict[str, Any]:
-    least, most = ZETA_1
+def bandwidth(surface: AnySurface) -> Any:
+    """Longest over shortest wavelength; of a spectrum from where on a band holds most height."""
+    if isinstance(surface, MeasuredSurface):
+        return np.asarray(surface.q1 / surface.longest)
+    return np.asarray(surface.zeta_1)
+
+
+def _has_low_hurst(surface: AnySurface, limits: Range) -> Any:
+    """Whether short wavelengths weigh more than with the least Hurst exponent.
+
+    Of a spectrum that is no power law, by its gradient: at equal height and band it is
+    larger than that of the least exponent.
+    """
+    hurst = getattr(surface, "hurst", 1.0)
+    if hurst is not None:
+        return below(hurst, limits)
+    ratio = bandwidth(surface)
+    if not ratio > 1:
+        return np.asarray(False)
+    least = 2 * limits[0]
+    # Eqs. (6) and (7) of a power law between 1/ratio and 1, in units of q1
+    squared_gradient = (1 - ratio ** (least - 2)) / (2 - least)
+    squared_height = (ratio**least - 1) / least
+    steepest = np.sqrt(squared_gradient / squared_height)
+    steepness = surface.rms_gradient / (surface.h_rms * surface.q1)
+    return above(steepness, (0.0, steepest))
+
+
+def _of_the_surface(surface: AnySurface, by_heights: bool) -> dict[str, Any]:
+    ranges = elastic_ranges()
+    ratio = bandwidth(surface)
+    least, most = ranges["bandwidth"]
     narrow = f"the longest wavelength is less than {least:g} times the shortest"
     broad = f"the longest wavelength is more than {most:g} times the shortest"
-    if isinstance(surface, MeasuredSurface):
-        ratio = surface.q1 / surface.longest
-        return {broad: np.asarray(ratio > most * (1 + ROUNDING))}
-    ratio = np.asarray(surface.zeta_1)
-    hurst = np.asarray(getattr(surface, "hurst", 1.0))
-    heights = np.asarray(surface.h_max / surface.h_rms)
-    return {
-        f"the Hurst exponent is below {HURST:g}": hurst < HURST * (1 - ROUNDING),
-        narrow: ratio < least * (1 - ROUNDING),
-        broad: ratio > most * (1 + ROUNDING),
-        f"h_max/h_rms is outside {HEIGHTS}": (heights < HEIGHTS[0])
-        | (heights > HEIGHTS[1]),
+    hurst = ranges["hurst"]
+    reasons = {
+        f"the Hurst exponent is below {hurst[0]:g}": _has_low_hurst(surface, hurst),
+        narrow: below(ratio, ranges["bandwidth"]),
+        broad: above(ratio, ranges["bandwidth"]),
     }
+    if by_heights:
+        return reasons
+    heights = np.asarray(surface.h_max) / np.asarray(surface.h_rms)
+    limits = ranges["heights"]
+    text = f"h_max/h_rms is outside {limits}"
+    reasons[text] = below(heights, limits) | above(heights, limits)
+    return reasons
 
 
 def _of_the_side(surface: AnySurface) -> dict[str, Any]:

@@ -357,6 +357,22 @@ def test_a_yielded_contact_is_not_called_blocked(pressure):
     assert law.leakage(1.01 * law.leakage.blocked_at) > 0
 
 
+@pytest.mark.parametrize("area", [0.05, 0.6])
+def test_a_hardness_that_nothing_reaches_leaves_the_flow_as_it_is(area):
+    """It was NaN where the elastic contact blocks, and never valid."""
+    face = Surface(hurst=0.8, q0=0.06, q1=2.4, h_rms=1.0, h_max=3.5, unit="um")
+    elastic = asked(face, "58 GPa", area=area)
+    for hardness in ("1e6 GPa", "1e12 GPa"):
+        hard = asked(face, Bodies("58 GPa", hardness=hardness), area=area)
+        np.testing.assert_allclose(hard.K, elastic.K, rtol=1e-6)
+        assert hard.blocked == elastic.blocked == (area > 0.42)
+        assert hard.valid == elastic.valid == (area < 0.42)
+        law = contact_law(face, Bodies("58 GPa", hardness=hardness), theory="calibrated")
+        np.testing.assert_allclose(law.leakage(area=area), elastic.K, rtol=1e-4)
+    soft = asked(face, Bodies("58 GPa", hardness="1 GPa"), area=area)
+    assert not soft.valid
+
+
 def test_the_separation_at_which_gaps_block_is_a_mean_separation():
     law = contact_law(
         Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5), theory="calibrated"

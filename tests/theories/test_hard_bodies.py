@@ -82,12 +82,12 @@ def test_force_rises_with_the_hardness_without_a_jump(theory):
         assert steps.max() <= 3
 
 
-@pytest.mark.parametrize("theory", THEORIES)
+@pytest.mark.parametrize("theory", ["mbma", "calibrated", "persson"])
 def test_where_valid_unloading_is_as_stiff_as_loading(theory):
     for hurst in (0.3, 0.8):
         for zeta_1 in (8.0, 128.0):
-            surface = Surface(hurst, 1e-3, 1e-3 * zeta_1, 1.0, 4.5)
-            u = 4.5 * np.linspace(0.02, 0.98, 25)[:, None]
+            surface = Surface(hurst, 1e-3, 1e-3 * zeta_1, 1.0, 4.2)
+            u = 4.2 * np.linspace(0.02, 0.98, 25)[:, None]
             caps = float(surface.rms_gradient) / np.geomspace(0.3, 30, 12)
             pressed = contact(
                 surface, Bodies(hardness=caps), mean_separation=u, theory=theory

@@ -6,8 +6,8 @@ import xarray as xr
 from helpers import contact_of
 
 from generate.boundary_elements.evidence import evidence
-from mbma_tables import Bodies, Surface, contact
-from mbma_tables.theories import THEORIES
+from mbma_tables import Bodies, InputError, Joint, Surface, contact, contact_law
+from mbma_tables.theories import THEORIES, Calibrated
 
 each = pytest.mark.parametrize("theory", THEORIES)
 
@@ -109,3 +109,125 @@ def test_the_bulk_yields_from_a_third_of_the_hardness_on(theory):
         surface, Bodies(hardness=np.inf), pressure=1e-3 * share, theory=theory
     )
     assert not any("a third of the hardness" in reason for reason in elastic.reasons)
+
+
+# ratio of the unloading stiffnesses of two theories, in standard deviations of their difference
+MOST_APART = 3.0
+
+
+@pytest.mark.parametrize("theory", [name for name in THEORIES if name != "calibrated"])
+@pytest.mark.parametrize("side", [4.0, 20.0, 100.0, 1000.0])
+def test_valid_faces_that_yield_agree_with_the_law_fitted_to_simulations(theory, side):
+    """Faces with a nominal area, whose highest point is up to 6 h_rms: MBMA is 20 times off there."""
+    face = Surface.from_roughness(
+        Rq="2 um",
+        longest="250 um",
+        shortest="4 um",
+        hurst=0.8,
+        nominal_area=f"{(side * 250) ** 2} um^2",
+    )
+    pressure = ["3 MPa", "10 MPa", "50 MPa", "200 MPa"]
+    for hardness in ("0.4 GPa", "1 GPa", "6 GPa"):
+        bodies = Bodies("115 GPa", hardness=hardness)
+        pressed = contact(face, bodies, pressure=pressure, theory=theory)
+        law = contact(face, bodies, pressure=pressure, theory="calibrated")
+        ratio = np.log(pressed.unloading_stiffness / law.unloading_stiffness)
+        scatter = np.hypot(
+            pressed.unloading_stiffness_scatter, law.unloading_stiffness_scatter
+        )
+        assert np.isfinite(scatter[pressed.valid]).all()
+        assert (np.abs(ratio) <= MOST_APART * scatter)[pressed.valid].all()
+
+
+def test_a_theory_that_was_not_compared_with_a_hardness_is_not_valid():
+    face = Surface(hurst=0.8, q0=0.06, q1=1.9, h_rms=0.2, h_max=0.7, unit="um")
+    pressed = contact(
+        face,
+        Bodies("115 GPa", hardness="1 GPa"),
+        area=0.05,
+        theory="greenwood_williamson",
+    )
+    assert not pressed.valid
+    assert any(
+        "not compared with simulations with a hardness" in r for r in pressed.reasons
+    )
+    # an infinite hardness is the elastic contact, which was
+    elastic = contact(
+        face, Bodies("115 GPa", hardness=np.inf), area=0.05, theory="greenwood_williamson"
+    )
+    assert elastic.valid
+
+
+class WithoutScatter:
+    """A theory of a user, of which no comparison is stated."""
+
+    name = "without scatter"
+
+    def answer(self, surface, u):
+        pressure = 0.1 * np.exp(-2 * u / surface.h_rms)
+        return pressure, 2 * pressure / surface.rms_gradient
+
+
+def test_without_a_stated_scatter_nothing_is_valid():
+    face = Surface(hurst=0.8, q0=0.06, q1=1.9, h_rms=1.0, h_max=3.5)
+    pressed = contact(face, pressure=1e-3, theory=WithoutScatter())
+    assert np.isnan(pressed.scatter)
+    assert not pressed.valid
+    assert any("model uncertainty" in reason for reason in pressed.reasons)
+
+
+@pytest.mark.parametrize("theory", ["calibrated", "persson"])
+@pytest.mark.parametrize(
+    ("changed", "reason"),
+    [
+        ({"q1": 0.32}, "less than 8 times the shortest"),
+        ({"h_max": 0.3}, "h_max/h_rms is outside"),
+        ({"h_max": 3.0}, "h_max/h_rms is outside"),
+        ({"hurst": 0.05}, "the Hurst exponent is below"),
+        ({"q1": 30.0}, "more than 128 times the shortest"),
+    ],
+)
+def test_a_spectrum_is_valid_where_its_five_numbers_are(theory, changed, reason):
+    numbers = {"hurst": 0.8, "q0": 0.1, "q1": 6.0, "h_rms": 0.3, "h_max": 1.1}
+    tested = Surface(**numbers, unit="um")
+    assert contact(tested, area=0.1, theory=theory).valid
+    assert contact(tested.sampled(), area=0.1, theory=theory).valid
+    surface = Surface(**numbers | changed, unit="um")
+    for face in (surface, surface.sampled()):
+        pressed = contact(face, area=0.1, theory=theory)
+        assert not pressed.valid
+        assert any(reason in text for text in pressed.reasons)
+
+
+def test_short_wavelengths_of_a_bent_spectrum_weigh_like_a_low_hurst_exponent():
+    # two power laws that meet, so that the spectrum as a whole has no exponent
+    q = np.geomspace(0.1, 6.0, 60)
+    for exponent, tested in ((2.05, False), (2.3, True), (3.6, True)):
+        C = np.where(q < 1.0, q**-exponent, q ** -(exponent + 0.3))
+        h_rms = Surface.from_spectrum(q, C, h_max=1.0, convention="paper").h_rms
+        surface = Surface.from_spectrum(
+            q, C * (0.1 / h_rms) ** 2, h_max=0.35, convention="paper"
+        )
+        assert surface.hurst is None
+        pressed = contact(surface, area=0.1, theory="calibrated")
+        assert bool(pressed.valid) == tested
+        low = [text for text in pressed.reasons if "the Hurst exponent" in text]
+        assert bool(low) != tested
+
+
+def test_a_smooth_second_face_does_not_widen_what_was_tested():
+    narrow = {"Rq": "0.3 um", "hurst": 0.8, "longest": "63 um", "shortest": "20 um"}
+    options = {"bodies": "100 GPa", "nominal_area": "4 cm^2"}
+    for faces in ((narrow,), (narrow, narrow | {"Rq": "1e-6 um"})):
+        assert not Joint(*faces, **options).at_pressure("10 MPa").valid
+
+
+def test_a_theory_with_a_hardness_is_no_theory_of_an_elastic_contact():
+    """Beside `Bodies` it was applied twice, and without them its unloading stiffness was that of loading."""
+    face = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5)
+    theory = Calibrated().with_hardness(0.01, 1.0)
+    for bodies in (1.0, Bodies(hardness=0.01)):
+        with pytest.raises(InputError, match="a hardness is of the bodies"):
+            contact(face, bodies, pressure=1e-3, theory=theory)
+        with pytest.raises(InputError, match="a hardness is of the bodies"):
+            contact_law(face, bodies, theory=theory)

@@ -24,7 +24,7 @@ from mbma_tables.theories.calibrated.formulas import (
     spectrum_of,
 )
 from mbma_tables.theories.calibrated.map_curves import LOG_FORCE, MapLaw, convex
-from mbma_tables.theories.tested import TESTED_AREA
+from mbma_tables.theories.tested import elastic_ranges
 
 if TYPE_CHECKING:
     from mbma_tables.theories.yielding.formulas import BearingCurve
@@ -87,7 +87,7 @@ class Curve:
         self._law = law
         # both approximations may disagree: gaps close, or increase with load, at partial contact
         heaviest = float(total[0])
-        closed = float(self.area(np.array(heaviest))) < TESTED_AREA[1]
+        closed = float(self.area(np.array(heaviest))) < elastic_ranges()["area"][1]
         self.end, self.heaviest = (
             (float(np.exp(fine[0])), heaviest) if closed else (0.0, np.inf)
         )

@@ -26,7 +26,6 @@ from mbma_tables.theories.calibrated.formulas import (
 from mbma_tables.theories.calibrated.formulas import area as law_area
 from mbma_tables.theories.evidence import NAME, shipped_checksum, shipped_deviations
 from mbma_tables.theories.inversion import Curve
-from mbma_tables.theories.tested import TESTED_AREA
 
 if TYPE_CHECKING:
     from mbma_tables.theories.calibrated.curves import OwnLaw
@@ -203,7 +202,7 @@ class Calibrated(Theory):
         x = gap / h_rms
         require("mean_separation", spread(gap, x.shape), x >= 0, "at least 0")
         stated = calibrated_table.shipped().error * np.exp(
-            rate * np.clip(x - start, 0, tested.HEIGHTS[1] - start)
+            rate * np.clip(x - start, 0, tested.elastic_ranges()["heights"][1] - start)
         )
         pressure, area, stiffness = found
         return TheoryAnswer(
@@ -302,7 +301,8 @@ class Calibrated(Theory):
             "constant over a range of forces"
         )
         straight = law.curve.straight(np.asarray(mean_separation) / law.h_rms)
-        return {text: straight & (answer.area >= TESTED_AREA[0]), **reasons}
+        light = tested.below(answer.area, tested.elastic_ranges()["area"])
+        return {text: straight & ~light, **reasons}
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         return surface.departures(by_map=self.scatter_name(surface) != self.name)

@@ -131,7 +131,6 @@ class Saturated(Yielding):
     """A simulated map whose pressures cannot exceed a hardness; each takes one or two times the elastic time."""
 
     elastic: BoundaryElements
-    tested_eta = 0.1
 
     def _each(self, ask: Callable[..., Any], *given: ArrayLike) -> Any:
         """What simulations answer at entries with their hardnesses; rows first."""

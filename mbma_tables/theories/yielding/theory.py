@@ -14,6 +14,7 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.theories import tested
 from mbma_tables.theories.base import Solved, Theory, TheoryAnswer, solved_by, unfinished
 from mbma_tables.theories.evidence import known_at, shipped_part
 from mbma_tables.theories.inversion import FEW_LOOKS, Curve
@@ -157,7 +158,6 @@ class Yielding(Theory):
     """
 
     elastic: Any = None
-    tested_eta = 0.025  # smallest p_m/(E* g) that was simulated
 
     def __init__(self, theory: Theory, hardness: ArrayLike) -> None:
         self.elastic, self.hardness, self.reached = (
@@ -384,17 +384,15 @@ class Yielding(Theory):
     def _of_hardness(self, surface: AnySurface, answer: TheoryAnswer) -> dict[str, Any]:
         """Reasons why contacts with this hardness were not tested, each with a mask."""
         shape = np.shape(answer.area)
-        soft = self._eta(surface) < self.tested_eta * (1 - ROUNDING)
+        eta = self._eta(surface)
         # a pressure that the whole face bears is the stress of the bulk
         bulk = answer.pressure > BULK_YIELD * self.hardness * (1 + ROUNDING)
-        soft_text = (
-            f"the hardness over E* times the rms gradient is below {self.tested_eta:g}"
-        )
         bulk_text = (
             "the nominal pressure is above a third of the hardness, which is about the yield stress: the bulk "
             "of the softer body yields, not its asperities alone; at most hardness/3 is covered"
         )
+        name = self.elastic.scatter_name(surface)
         return {
-            soft_text: np.broadcast_to(soft, shape),
+            **tested.untested_with_hardness(surface, name, answer.area, eta),
             bulk_text: np.broadcast_to(bulk, shape),
         }
