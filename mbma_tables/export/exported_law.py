@@ -154,6 +154,12 @@ class ExportedLaw:
             else self.law.leakage.along(self.direction)
         )
 
+    @property
+    def leaks_unknown(self) -> bool:
+        """Whether the flow is not known, rather than none, where the elastic contact blocks it."""
+        blocked = self.leakage.blocked_at
+        return bool(blocked > -np.inf and np.isnan(self.leakage(blocked)))
+
     def answer(self, u: FloatArray) -> Any:
         """The theory itself at mean separations; of a body the contacts at approaches that are left to the largest."""
         if self.force is not None:
@@ -336,8 +342,8 @@ class ExportedLaw:
             load = float(self.law.pressure(blocked))
             c = self.law.h_max - blocked
             where = f"from p = {number(load)} {stress}, c = {number(c)} on"
-            if np.isnan(self.leakage(blocked)):
-                yield f"K = 0 stands for not known {where}: the elastic contact blocks there, and a yielded one leaks"
+            if self.leaks_unknown:
+                yield f"K is not known {where}: the elastic contact blocks there, and a yielded one leaks"
             else:
                 yield f"blocked, K = 0, {where}"
         else:

@@ -66,6 +66,9 @@ class Language:
     # functions for which @EACH@ is repeated, by default those that are slopes times a ratio
     repeated: Callable[[AskedLaw], dict[str, str]] | None = None
     parts: Mapping[str, str] = dataclasses.field(default_factory=dict)  # other places
+    # a flow that is not known, and none, as texts
+    unknown: str = "(double)NAN"
+    none: str = "0.0"
     beside: tuple[Beside, ...] = ()  # other files of the target
     alone: bool = True  # whether the first file can be used without those beside it
     # names that it cannot have, in small letters

@@ -229,10 +229,17 @@ def _common_places(language: Language, asked: AskedLaw) -> dict[str, str]:
         "C_MOST": language.number(exported.c_most),
         "CONDUCTANCE": language.ratios(asked).get("conductance", ""),
         "LEAKAGE": asked.more.get("leakage", ""),
+        "CLOSED": _where_blocked(language, asked),
         "ELASTIC": "yes" if asked.yields else "",
         "SLOPED": "ELASTIC" if asked.yields else "LAW",
         **language.parts,
     }
+
+
+def _where_blocked(language: Language, asked: AskedLaw) -> str:
+    """The flow where contact blocks it: none, or not known of contact that yields."""
+    unknown = "leakage" in asked.more and asked.exported.leaks_unknown
+    return language.unknown if unknown else language.none
 
 
 def _example(exported: ExportedLaw, language: Language) -> str:

@@ -246,10 +246,11 @@ def _curve(
         return c, pressure
     rises = np.append(True, np.diff(pressure) > 0)
     if quantity in FLOWS:
-        # 0 where the flow of a yielded contact is not known, as the header states
-        flow = np.nan_to_num(np.asarray(exported.leakage(separation=d)), nan=0.0)
-        # the first row that is blocked is the last
-        open_ = rises & np.append(True, flow[:-1] > 0)
+        flow = np.asarray(exported.leakage(separation=d))
+        # the first row that is blocked is the last; what is not known has no row
+        open_ = rises & np.append(True, flow[:-1] > 0) & ~np.isnan(flow)
+        if not open_.any():
+            raise InputError(f"{quantity} of this yielded contact is not known anywhere")
         return pressure[open_], flow[open_] ** FLOWS[quantity]
     if exported.hardness < np.inf:
         stiffness[1:] = exported.answer(law.h_max - c[1:]).unloading_stiffness
@@ -355,8 +356,10 @@ def _table(
         if law.turning_point is None
         else "where the force of this surface has its maximum"
     )
-    if quantity == "leakage" and exported.leakage.blocked_at >= law.h_max - end:
+    if quantity in FLOWS and exported.leakage.blocked_at >= law.h_max - end:
         why = "where contact blocks the gaps"
+        if exported.leaks_unknown:
+            why = "where the elastic contact blocks the gaps: beyond, the flow of the yielded one is not known"
     elif end < exported.c_turn * (1 - ROUNDING):
         why = "the largest asked for"
     more: dict[str, tuple[FloatArray, str]] = {}

@@ -68,6 +68,13 @@ class Points:
             TANGENTS, close
         )
 
+    def at(self, some):
+        """Those of some overclosures."""
+        names = ("c", "p", "tangent", "area", "energy", "leakage")
+        return dataclasses.replace(
+            self, **{name: getattr(self, name)[some] for name in names}
+        )
+
     def pressures(self):
         """Pressures on the branch of first contact, but where pieces meet: they do so within the law's error alone."""
         return self.p[:POINTS][self.c[:POINTS] < self.c_turn]
@@ -116,8 +123,8 @@ def points(name):
     assert ((h - d) / 2 == c).all()
     turn = law.lowest if law.turning_point is None else law.turning_point
     found = law.values(separation=d)
-    # code has 0 where the flow of a yielded contact is not known, as its header states
-    flow = np.nan_to_num(np.asarray(law.leakage(separation=d)), nan=0.0)
+    # NaN where the flow of a yielded contact is not known
+    flow = np.asarray(law.leakage(separation=d))
     return Points(
         law,
         c,

@@ -424,3 +424,26 @@ def test_rows_of_a_law_with_a_hardness():
         20.0 / 100e3 * found.unloading_stiffness, rel=1e-2
     )
     assert (np.asarray(found.unloading_stiffness) > 1.1 * found.stiffness).all()
+
+
+@pytest.mark.parametrize("quantity", ["leakage", "hydraulic_aperture"])
+def test_rows_of_a_yielded_seal_end_where_its_flow_is_not_known(quantity):
+    """The last row was 0.0, and the range "where contact blocks the gaps"."""
+    hard = Bodies(100e3, hardness=1500.0)
+    law = describe_law(
+        HARD, "100 GPa", stress_unit="MPa", hardness="1500 MPa", quantity=quantity,
+        theory="calibrated", rtol=1e-2,
+    )  # fmt: skip
+    elastic = describe_law(
+        HARD, "100 GPa", stress_unit="MPa", quantity=quantity, theory="calibrated", rtol=1e-2,
+    )  # fmt: skip
+    assert law.y.min() > 0
+    assert elastic.y[-1] == 0
+    end = float(law.x[-1])
+    made = contact_law(HARD, hard, "calibrated")
+    assert made.leakage(pressure=end * (1 - 1e-6)) > 0
+    assert np.isnan(made.leakage(pressure=end * 1.01))
+    text = " ".join(law.comments)
+    assert "beyond, the flow of the yielded one is not known" in text
+    assert "K is not known from p = " in text
+    assert "K = 0 stands for" not in text

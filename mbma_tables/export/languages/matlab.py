@@ -33,6 +33,7 @@ LANGUAGES = {
         call="law.{what}({x})",
         law_places=_law_places,
         number=_notation.number,
+        unknown="NaN",
         reserved=_reserved,
         unloads=False,
     )

@@ -69,6 +69,9 @@ LANGUAGES = {
         call="{name}.{what}({x})",
         law_places=_law_places,
         number=_notation.number,
+        # of an assertion: Modelica has no NaN
+        unknown="false",
+        none="true",
         reserved=_reserved,
         # tools solve for c themselves
         inverts=False,
