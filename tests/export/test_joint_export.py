@@ -103,7 +103,7 @@ def test_without_gas_rows_are_of_the_solid(joint):
     read = np.interp(
         [1.0, 10.0], content["columns"]["pressure"], content["columns"]["conductance"]
     )
-    solid = joint.table(["1 MPa", "10 MPa"])["conductance"].to_numpy()
+    solid = joint.table(["1 MPa", "10 MPa"])["solid_conductance"].to_numpy()
     np.testing.assert_allclose(1000 * read, solid, rtol=1.1e-3)
     assert "solid spots alone, without gas" in " ".join(content["comments"])
 
@@ -153,7 +153,7 @@ def test_fortran_of_a_joint_runs_with_its_own_files(joint, tmp_path):
     ran = subprocess.run(
         ["./run"], cwd=tmp_path, check=True, capture_output=True, text=True
     )
-    solid = joint.table(["10 MPa"])["conductance"].to_numpy()[0]
+    solid = joint.table(["10 MPa"])["solid_conductance"].to_numpy()[0]
     assert 1000 * float(ran.stdout) == pytest.approx(solid, rel=1e-4)
 
 
