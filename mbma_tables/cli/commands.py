@@ -298,6 +298,7 @@ def fit_command(
     options.check_plot(plot, output.out)
     from mbma_tables.common.plots import pressure_label, to_picture
     from mbma_tables.common.units import Units
+    from mbma_tables.contacts.contact import chosen_theory
     from mbma_tables.contacts.measurement import (
         areal,
         curves,
@@ -317,7 +318,8 @@ def fit_command(
     scale = 1.0 if modulus is None else modulus
     full = Simulated(grid="full")
     theory = full.name if simulate else theory_name(surface, None, "area")
-    columns, told = table_of_loads(surface, scale, full if simulate else theory)
+    tabulated = full if simulate else theory
+    columns, told = table_of_loads(surface, scale, tabulated)
     if simulate and output.out is not None and output.out.suffix == ".nc":
         full.of(surface).to_netcdf(output.out)
         told = [*told, f"{output.out} has the simulation"]
@@ -337,7 +339,8 @@ def fit_command(
             draw(scans[0][0], surface, curves(surface, scale), title, label),
             plot.suffix[1:],
         )
-    notes = [*described(surface), f"table by theory {theory}", *told]
+    departures = chosen_theory(surface, tabulated, "area").departures(surface)
+    notes = [*described(surface, departures), f"table by theory {theory}", *told]
     Report("fit", title, notes, facts, columns, own).write(output, plot, picture)
 
 

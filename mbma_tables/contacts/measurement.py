@@ -1,6 +1,6 @@
 """Report on a measured map or line scan: text lines, a table of loads and one picture."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -24,8 +24,11 @@ GAPS = np.append(
 )  # u/h_max of curves
 
 
-def described(surface: MeasuredSurface) -> list[str]:
-    """Text lines on a measurement: its properties, its treatment, and consequences for theories."""
+def described(surface: MeasuredSurface, departures: Iterable[str] = ()) -> list[str]:
+    """Text lines on a measurement: its properties, its treatment, and a theory's departures.
+
+    These are why no contact of the surface is valid by the theory.
+    """
     unit = surface.unit or "length"
     h_rms = float(surface.h_rms)
     shortest = 2 * np.pi / float(surface.q1)
@@ -71,10 +74,7 @@ def described(surface: MeasuredSurface) -> list[str]:
         lines.append(
             f"slopes: {ratio}, kurtosis {surface.bearing.slope_kurtosis:.3g} (Gaussian: 3)"
         )
-    lines += [
-        f"not valid: {reason}"
-        for reason in surface.departures(by_map=surface.bearing is not None)
-    ]
+    lines += [f"not valid: {reason}" for reason in departures]
     return lines + [entry["told"] for entry in surface.provenance if "told" in entry]
 
 

@@ -22,8 +22,13 @@ def resolving(shortest: float, step: float, unit: str | None) -> str:
     if shortest >= MIN_POINTS * step * (1 - ROUNDING):
         return ""
     # a little longer, so that four digits are enough
-    wavelength = f"{1.001 * MIN_POINTS * step:.4g}"
-    return f"short_cutoff='{wavelength} {unit}'" if unit else f"short_cutoff={wavelength}"
+    return cutting(1.001 * MIN_POINTS * step, unit)
+
+
+def cutting(wavelength: float, unit: str | None) -> str:
+    """The option of `Surface.from_map` that leaves wavelengths of at least this [length]."""
+    length = f"{wavelength:.4g}"
+    return f"short_cutoff='{length} {unit}'" if unit else f"short_cutoff={length}"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

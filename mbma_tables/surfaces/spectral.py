@@ -292,22 +292,29 @@ class SpectralSurface(AnySurface):
         if self.anisotropy is not None:
             statistics["anisotropy"] = self.anisotropy
         remedy = "beyond, only 'calibrated' by a map was tested"
-        if by_map and self.scans:
-            remedy = (
-                "contact(surface.scans[0], ..., theory='simulated') simulates one scan"
-            )
-        elif by_map:
-            remedy = "theory='simulated' simulates the map"
-            if self.map is not None:
-                from mbma_tables.surfaces.map_simulation import resolving
-
-                cutoff = resolving(self.shortest(ROUNDED), max(self.map.steps), self.unit)
-                remedy += f" of Surface.from_map(..., {cutoff})" if cutoff else ""
+        if self.scans:
+            call = self.scans[0].simulating("surface.scans[0]")
+            remedy = f"{call} simulates one scan"
+        elif call := self.simulating():
+            remedy = f"{call} simulates the map"
         return tuple(
             f"{name} is {statistics[name]:.3g}, tested from {low:g} to {high:g}: {remedy}"
             for name, (low, high) in tested.items()
             if name in statistics and not low <= statistics[name] <= high
         )
+
+    def simulating(self, name: str = "surface") -> str:
+        """A call that simulates the map, as far as it resolves wavelengths.
+
+        Empty where there is no map.
+        """
+        if self.map is None or self.map.heights.ndim != 2:
+            return ""
+        from mbma_tables.surfaces.map_simulation import resolving
+
+        cutoff = resolving(self.shortest(ROUNDED), max(self.map.steps), self.unit)
+        face = f"Surface.from_map(..., {cutoff})" if cutoff else name
+        return f"contact({face}, ..., theory='simulated')"
 
     def power_spectrum(self, q: ArrayLike) -> Any:
         """C(q) [length^4], a power law between samples, zero outside [q0, q1]."""
@@ -449,9 +456,11 @@ class SpectralSurface(AnySurface):
             f"gradient would be {gradient:.2f} times as large"
         )
         if self.map is not None:
+            from mbma_tables.surfaces.map_simulation import cutting
+
             description += (
-                f"; a simulation with short_cutoff={2 * shortest:.4g} gives the area "
-                "without them"
+                f"; a simulation of Surface.from_map(..., "
+                f"{cutting(2 * shortest, self.unit)}) gives the area without them"
             )
         record = {
             "step": "resolution",

@@ -191,3 +191,17 @@ def test_plain_lengths_of_a_map_are_in_the_unit_asked_for(map_file):
         pytest.approx(own),
         pytest.approx(own),
     )
+
+
+def test_reasons_are_those_of_the_theory_that_is_tabulated():
+    words = (MAP, "--short-cutoff", "9.4nm")
+    fit = run("fit", *words)
+    assert "table by theory simulated" in fit
+    # which is of the map, whatever its statistics
+    assert "tested from" not in fit.split("map of 256")[0]
+    area = ("--short-cutoff", "9.4nm", "--area", "0.1", "--json")
+    found = json.loads(run("contact", "--map", MAP, *area))
+    assert found["theory"] == "simulated"
+    row = next(line for line in fit.splitlines() if line.strip().startswith("0.1 "))
+    pressure = found["columns"]["pressure"][0]
+    assert float(row.split()[1]) == pytest.approx(pressure, rel=1e-5)

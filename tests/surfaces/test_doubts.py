@@ -21,6 +21,20 @@ from mbma_tables.theories import Simulated
 
 topographies()
 
+
+def pasted(found, given, surface=None, **question):
+    """The call in a contact's reason with what it leaves out filled in: map and question."""
+    call = next(
+        match[0]
+        for text in found.reasons
+        if (match := re.search(r"contact\(.*theory=(?:'\w+'|Simulated\(.*?\))\)", text))
+    )
+    call = call.replace("Surface.from_map(...", "Surface.from_map(**given")
+    names = {"Surface": Surface, "contact": contact, "Simulated": Simulated}
+    names |= {"surface": surface or Surface.from_map(**given), "given": given}
+    return eval(call.replace("...", "**question"), names | {"question": question})
+
+
 PART = Part("eroded", 1, 64)
 MAP = heights(PART)
 
@@ -198,24 +212,17 @@ class TestSampling:
         given = {"heights": step * noise, "dx": step, "periodic": True, "unit": unit}
         found = asked(Surface.from_map(**given), Simulated(grid))
         assert not found.valid
-        remedy = re.search(
-            r"Surface\.from_map\(\.\.\., (.*)\)$", next(iter(found.reasons))
-        )
-        mended = eval(
-            f"Surface.from_map(**given, {remedy[1]})",
-            {"Surface": Surface, "given": given},
-        )
-        assert asked(mended, Simulated(grid)).valid
+        assert pasted(found, given, area=0.1).valid
 
-    def test_the_calibrated_law_names_the_same(self):
+    def test_the_calibrated_law_names_a_call_that_is_valid(self):
         noise = MAP + 0.02 * MAP.std() * np.random.default_rng(2).standard_normal(
             MAP.shape
         )
-        found = asked(of(noise), "calibrated")
-        assert (
-            "theory='simulated' simulates the map of Surface.from_map(..., short_cutoff=4.004)"
-            in str(found.reasons)
-        )
+        given = {"heights": noise, "dx": 1.0, "periodic": True}
+        for theory in ("calibrated", "persson", "mbma"):
+            found = contact(Surface.from_map(**given), pressure=2e-3, theory=theory)
+            assert not found.valid
+            assert pasted(found, given, area=0.1).valid
 
     @pytest.mark.parametrize("bits", [16, 24])
     def test_rounding_of_heights_is_no_wavelength(self, bits):
@@ -227,21 +234,25 @@ class TestSampling:
 
     def test_light_contacts_name_the_grid_that_reaches_them(self):
         found = contact(of(MAP), area=0.002, theory="simulated")
-        assert list(found.reasons) == [
-            "A/A0 is below 0.003: theory=Simulated(grid='full') was tested from 0.001 on"
+        given = {"heights": MAP, "dx": 1.0, "periodic": True}
+        assert pasted(found, given, area=0.002).valid
+        # and nothing is named for those that no grid reaches
+        lightest = contact(of(MAP), area=5e-4, theory="simulated")
+        assert list(lightest.reasons) == [
+            "A/A0 is below 0.001, the lightest contact that was tested"
         ]
-        assert contact(of(MAP), area=0.002, theory=Simulated(grid="full")).valid
 
-    def test_an_average_names_a_scan(self):
-        both = average([of(MAP), of(MAP[::-1])])
+    @pytest.mark.parametrize("noise", [0.0, 0.02])
+    def test_an_average_names_a_scan(self, noise):
+        rng = np.random.default_rng(3)
+        maps = [
+            values + noise * rng.standard_normal(MAP.shape) for values in (MAP, MAP[::-1])
+        ]
+        both = average([of(values) for values in maps])
         found = contact(both, area=0.1, theory="calibrated")
-        remedy = re.search(
-            r"contact\(surface\.scans\[0\], \.\.\., theory='simulated'\)",
-            str(found.reasons),
-        )
-        assert remedy
-        call = remedy[0].replace("...", "area=0.1")
-        assert eval(call, {"contact": contact, "surface": both}).valid
+        given = {"heights": maps[0], "dx": 1.0, "periodic": True}
+        assert ("surface.scans[0]" in str(found.reasons)) == (noise == 0)
+        assert pasted(found, given, surface=both, area=0.1).valid
 
 
 @pytest.mark.parametrize("pattern", ["sine", "egg-box"])

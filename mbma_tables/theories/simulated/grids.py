@@ -45,8 +45,6 @@ class Grid:
     simulates_all : bool
         Whether flow and a hardness are simulated on it too. Otherwise flow is that of the full
         grid at equal pressure, and a hardness is by the law of hardness.
-    remedies : (str, str)
-        Added to the reasons why lighter and heavier contacts are not valid.
     """
 
     name: str
@@ -56,7 +54,11 @@ class Grid:
     scatters: Mapping[str, tuple[float, ...]]
     halvings: int = 0
     simulates_all: bool = True
-    remedies: tuple[str, str] = ("", "")
+
+    @property
+    def call(self) -> str:
+        """The theory of this grid, as it is written."""
+        return "'simulated'" if self is QUICK else f"Simulated(grid={self.name!r})"
 
 
 FULL = Grid(
@@ -86,9 +88,5 @@ QUICK = Grid(
         "flow": FLOW_SCATTER,
     },
     simulates_all=False,
-    remedies=(
-        f": theory=Simulated(grid='full') was tested from {FULL.tested[0]:g} on",
-        f": theory=Simulated(grid='full') was tested up to {FULL.tested[1]:g}",
-    ),
 )
 GRIDS = {grid.name: grid for grid in (FULL, HALF, QUICK)}

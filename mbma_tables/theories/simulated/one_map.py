@@ -236,26 +236,54 @@ class BoundaryElements(Theory):
     ) -> dict[str, Any]:
         area = answer.area
         left_out = self.pressed.left_out
-        coarse = f"the map's shortest wavelength has {self.points:.2g} sampling steps, fewer than {MIN_POINTS:g}"
+        coarse = (
+            f"the map's shortest wavelength has {self.points:.2g} sampling steps, fewer "
+            f"than {MIN_POINTS:g}"
+        )
         whole = self.surface.map
         if whole is None:
             coarse += f": simulate it again with a short_cutoff of {MIN_POINTS:g} steps"
         else:
-            cutoff = resolving(
-                self.points * max(whole.steps), max(whole.steps), self.surface.unit
+            step = max(whole.steps)
+            cutoff = resolving(self.points * step, step, self.surface.unit)
+            coarse += (
+                f": contact(Surface.from_map(..., {cutoff}), ..., theory={self.grid.call})"
+                " simulates what is resolved"
             )
-            coarse += f": give Surface.from_map(..., {cutoff})"
-        cut = f"wavelengths below {left_out:.4g} were left out, since the grid has fewer points than the map"
+        cut = (
+            f"wavelengths below {left_out:.4g} were left out, since the grid has fewer "
+            "points than the map"
+        )
+        if self.grid.halvings:
+            cut += f": contact(surface, ..., theory={FULL.call}) leaves none out"
         return {
             coarse: np.full(area.shape, self.points < MIN_POINTS * (1 - ROUNDING)),
             cut: np.full(area.shape, left_out > 0),
-            f"A/A0 is below {self.grid.tested[0]:g}{self.grid.remedies[0]}": (
-                area < self.grid.tested[0]
+            **self._untested(area),
+        }
+
+    def _untested(self, area: FloatArray) -> dict[str, Any]:
+        """Contacts lighter or heavier than this grid, and than any grid, was tested at."""
+        least, most = self.grid.tested
+        lightest, heaviest = FULL.tested
+        call = f"contact(surface, ..., theory={FULL.call})"
+        reasons = {
+            f"A/A0 is below {lightest:g}, the lightest contact that was tested": (
+                area < lightest
             )
             & (area > 0),
-            f"A/A0 is above {self.grid.tested[1]:g}{self.grid.remedies[1]}": area
-            > self.grid.tested[1],
+            f"A/A0 is above {heaviest:g}, the heaviest contact that was tested": (
+                area > heaviest
+            ),
         }
+        if (least, most) != (lightest, heaviest):
+            reasons[
+                f"A/A0 is below {least:g}: {call} was tested from {lightest:g} on"
+            ] = (area < least) & (area >= lightest)
+            reasons[f"A/A0 is above {most:g}: {call} was tested up to {heaviest:g}"] = (
+                area > most
+            ) & (area <= heaviest)
+        return reasons
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation against the full grid at tolerance 1e-6, of areas a finer one; NaN beyond the loads."""

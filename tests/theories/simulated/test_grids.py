@@ -56,7 +56,8 @@ def test_half_of_the_points_of_another_map_leave_wavelengths_out():
     pressed = contact(surface, area=0.1, theory=Simulated(grid="half"))
     assert not pressed.valid
     reason = (
-        "wavelengths below 8 were left out, since the grid has fewer points than the map"
+        "wavelengths below 8 were left out, since the grid has fewer points than the "
+        "map: contact(surface, ..., theory=Simulated(grid='full')) leaves none out"
     )
     assert reason in pressed.reasons
 
@@ -95,7 +96,7 @@ def test_on_the_command_line(tmp_path):
     quick = run(*words)
     full = run(*words, "--grid", "full")
     assert run(*words, "--theory", "simulated", "--grid", "quick") == quick
-    assert "Simulated(grid='full') was tested from 0.001 on" in quick
+    assert "Simulated(grid='full')) was tested from 0.001 on" in quick
     assert "tested from" not in full
     assert "--grid is of theory 'simulated', not of 'persson'" in refused(
         *words, "--theory", "persson", "--grid", "full"

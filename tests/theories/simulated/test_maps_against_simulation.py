@@ -44,7 +44,7 @@ def test_other_maps_are_not_and_say_what_helps(family, number, statistic):
     )
     assert not found.valid.any()
     (reason,) = (text for text in found.reasons if text.startswith(statistic))
-    assert reason.endswith("theory='simulated' simulates the map")
+    assert reason.endswith("theory='simulated') simulates the map")
     coarse = Surface.from_map(
         surface_of(family, number).map.heights[::2, ::2], 2.0, periodic=True
     )
