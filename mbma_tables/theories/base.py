@@ -6,6 +6,7 @@ These are the elastic energy, and the gap at a given load or area (`theories.inv
 from __future__ import annotations
 
 import abc
+import dataclasses
 import importlib
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
@@ -20,7 +21,7 @@ from mbma_tables.common.arguments import (
     rows,
     spread,
 )
-from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
+from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import inversion, tested
 from mbma_tables.theories.evidence import shipped_deviations
@@ -78,12 +79,13 @@ class UserTheory(Protocol):
 
 
 class Theory(abc.ABC):
-    """A theory, with quantities derived from its forces."""
+    """A theory, with quantities derived from its forces.
+
+    One with options is a frozen dataclass, whose fields are the options: they make its text,
+    its equality and its pickle.
+    """
 
     name: str
-    # names of its variant of the paper and of its island model in results
-    variant_name = ""
-    island_model_name = ""
     # one line of advice; origin of its numbers, if not a shipped file
     advice = ""
     origin = ""
@@ -95,6 +97,42 @@ class Theory(abc.ABC):
     bends_in_area = False  # whether at its `bends` only the area is not smooth
     # whether force vanishes at u = h_max; else its Gaussian heights are unbounded
     ends_at_h_max = True
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Its options by name."""
+        if not dataclasses.is_dataclass(self):
+            return {}
+        return {
+            field.name: getattr(self, field.name) for field in dataclasses.fields(self)
+        }
+
+    def __repr__(self) -> str:
+        if not dataclasses.is_dataclass(self):
+            return super().__repr__()
+        try:
+            by_default = type(self)().options
+        except TypeError:  # some options have no default
+            by_default = {}
+        changed = []
+        for name, value in self.options.items():
+            if name not in by_default or np.any(value != by_default[name]):
+                changed.append(f"{name}={value!r}")
+        return f"{type(self).__name__}({', '.join(changed)})"
+
+    def __getstate__(self) -> dict[str, Any]:
+        # without what was computed from the options
+        return self.options if dataclasses.is_dataclass(self) else vars(self)
+
+    @property
+    def variant_name(self) -> str:
+        """Name of its variant of the paper in results, if it has any."""
+        return ""
+
+    @property
+    def island_model_name(self) -> str:
+        """Name of its island model in results, if it has one."""
+        return ""
 
     @abc.abstractmethod
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
@@ -385,6 +423,11 @@ class Theory(abc.ABC):
 
 def solved_by(answer: TheoryAnswer, modulus: FloatArray, loaded: Any = None) -> Solved:
     """Contacts of an answer over E*, in the unit of the modulus."""
+    if not isinstance(answer, TheoryAnswer):
+        raise InputError(
+            "a class derived from Theory must answer a TheoryAnswer(pressure, area, "
+            f"stiffness, error), got {type(answer).__name__}"
+        )
     return Solved(
         pressure=(modulus * answer.pressure)[()],
         area=answer.area[()],

@@ -1,5 +1,6 @@
 """The theory of Greenwood and Williamson (Eqs. 11, 12)."""
 
+import dataclasses
 import math
 from typing import Any
 
@@ -17,6 +18,7 @@ MAX_DEPTH = (
 MAX_AREA = 0.1  # A/A0 up to which asperities are nearly independent
 
 
+@dataclasses.dataclass(frozen=True, repr=False)
 class GreenwoodWilliamson(Theory):
     """Equal spheres with Gaussian heights (Eqs. 11, 12), Nayak's summits (Eq. 2), separations related by Eq. (50).
 

@@ -1,5 +1,6 @@
 """Persson's theory (Eqs. 18-21); (19) is u_P of `calibrated.formulas` with the weight W = gamma P + (1 - gamma) P^3."""
 
+import dataclasses
 import math
 from typing import Any, Literal
 
@@ -56,6 +57,7 @@ class _Light:
         return self.u0 * load
 
 
+@dataclasses.dataclass(frozen=True, repr=False)
 class Persson(Theory):
     """Persson's theory: area by Eq. (18), average separation by Eqs. (19)-(21).
 
@@ -81,13 +83,16 @@ class Persson(Theory):
     0.0184
     """
 
+    method: Method = "full"
+
     name = "persson"
     ends_at_h_max = False
 
-    def __init__(self, method: Method = "full") -> None:
-        if method not in ("full", "simplified"):
-            raise InputError(f"method must be 'full' or 'simplified', got {method!r}")
-        self.method: Method = method
+    def __post_init__(self) -> None:
+        if self.method not in ("full", "simplified"):
+            raise InputError(
+                f"method must be 'full' or 'simplified', got {self.method!r}"
+            )
 
     def _by_law(
         self, surface: AnySurface, quantity: str, given: FloatArray

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.errors import OutOfRangeError
+from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import (
     Theory,
@@ -15,6 +15,17 @@ from mbma_tables.theories.base import (
 )
 from mbma_tables.theories.inversion import FEW_LOOKS, Curve
 
+# methods and attributes of `Theory` that a user's object may have
+OF_USERS = (
+    "interval",
+    "ends_at_h_max",
+    "bends",
+    "departures",
+    "reasons",
+    "scatter",
+    "advice",
+    "rtol",
+)
 ENOUGH = 2e-8  # relative error of stiffnesses
 
 
@@ -44,9 +55,25 @@ def answer_where_finite(
 
 
 class Wrapped(Theory):
-    """A user's theory, its stiffness by numerical differentiation."""
+    """A user's theory, its stiffness by numerical differentiation.
+
+    What the user's object has beside its answer stands in place of the defaults.
+    """
 
     looks = FEW_LOOKS  # each may take long
+
+    def __init__(self, theory: UserTheory) -> None:
+        self.name = theory.name
+        self._theory = theory
+        for name in OF_USERS:
+            if hasattr(theory, name):
+                vars(self)[name] = getattr(theory, name)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"_theory": self._theory}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        Wrapped.__init__(self, state["_theory"])
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """None: its author is responsible."""
@@ -61,20 +88,13 @@ class Wrapped(Theory):
         """None: its author is responsible."""
         return {}
 
-    def __init__(self, theory: UserTheory) -> None:
-        self.name = theory.name
-        self._theory = theory
-
     @np.errstate(all="ignore")
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length]; the error is not known."""
         from scipy.differentiate import derivative
 
         u = np.asarray(mean_separation, dtype=float)
-        found = self._theory.answer(surface, u)
-        pressure, area = (
-            np.array(np.broadcast_to(part, u.shape), dtype=float) for part in found
-        )
+        pressure, area = self._forces_and_areas(surface, u)
 
         def force(x: FloatArray, place: FloatArray) -> FloatArray:
             return np.broadcast_to(
@@ -86,6 +106,22 @@ class Wrapped(Theory):
         known = {"order": 4, "initial_step": step, "tolerances": {"rtol": ENOUGH}}
         slope = derivative(force, u, args=(place,), **known).df
         return TheoryAnswer(pressure, area, -slope, np.full(u.shape, np.nan))
+
+    def _forces_and_areas(
+        self, surface: AnySurface, u: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Copies of what the user's theory answers, in the shape of u."""
+        answer = self._theory.answer(surface, u)
+        try:
+            pressure, area = (
+                np.array(np.broadcast_to(part, u.shape), dtype=float) for part in answer
+            )
+        except (TypeError, ValueError) as fault:
+            raise InputError(
+                f"theory {self.name!r} must answer F/(A0 E*) and A/A0, arrays of the shape "
+                f"of u, {u.shape}: {fault}"
+            ) from None
+        return pressure, area
 
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, cast
@@ -159,6 +160,7 @@ def _spread(surface: MeasuredSurface, quantity: str, area: FloatArray) -> FloatA
     return np.asarray(np.std(found, axis=0, ddof=1))
 
 
+@dataclasses.dataclass(frozen=True, repr=False)
 class Calibrated(Theory):
     """Persson's energy integral with cover and weight calibrated on boundary elements.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ from mbma_tables.theories.mbma.island_models import (
 from mbma_tables.theories.mbma.profile import profile
 from mbma_tables.theories.mbma.sums import QUADRATURE_SHARE, Sums, Totals, totals_at
 from mbma_tables.theories.mbma.tables import get_model
-from mbma_tables.theories.mbma.variants import NAMED, Variant, get_variant
+from mbma_tables.theories.mbma.variants import NAMED, get_variant
 
 SCAN = 49  # compressions at which force, area and stiffness are searched for a maximum
 # leading powers of h_max - d of force and area
@@ -41,32 +42,58 @@ LAYER_SHARE = 0.5  # of the boundary layer, up to which these powers dominate
 MAX_AREA = 0.1  # above it islands begin to overlap (docs/fidelity.md)
 
 
+@dataclasses.dataclass(frozen=True, repr=False)
 class Mbma(Theory):
     """The MBMA model of one island model and variant.
 
     Parameters
     ----------
-    island model, variant, rtol, outside
-        As for `mbma_tables.contact`.
+    island_model : str or island model
+        How islands are evaluated: "universal" or "island4d", the shipped tables; "exact",
+        the solver; "formula" or "rigid", closed forms; or an object, such as that of
+        `mbma_tables.open_table`.
+    variant : str or Variant
+        Interpretation of the paper: "reported", "printed" or "fitted", or a `Variant`.
+    rtol : float
+        Relative error of totals against the island model, in [1e-11, 0.1].
+    outside : {"raise", "exact", "nan"}
+        What happens where a table does not cover an island: an error, the solver, or NaN.
+
+    Raises
+    ------
+    InputError
+        For an unknown variant or `outside`.
+
+    Examples
+    --------
+    >>> from mbma_tables.theories import Mbma
+    >>> Mbma(rtol=1e-4, outside="exact")
+    Mbma(rtol=0.0001, outside='exact')
+    >>> Mbma(variant="reported") == Mbma()
+    True
     """
+
+    island_model: str | AnyModel = "universal"
+    variant: Any = "reported"
+    rtol: float = 1e-8
+    outside: str = "raise"
 
     name = "mbma"
     advice = "theory='calibrated' for stiffness or separation"
 
-    def __init__(
-        self,
-        island_model: str | AnyModel = "universal",
-        variant: str | Variant = "reported",
-        rtol: float = 1e-8,
-        outside: str = "raise",
-    ) -> None:
-        check_outside(outside)
-        self.island_model = island_model
-        self.variant = get_variant(variant)
-        self.rtol = rtol
-        self.outside = outside
-        self.variant_name = self.variant.name
-        self.island_model_name = island_model_name(island_model)
+    def __post_init__(self) -> None:
+        check_outside(self.outside)
+        object.__setattr__(self, "variant", get_variant(self.variant))
+
+    @property
+    def variant_name(self) -> str:
+        """Name of the variant in results."""
+        return str(self.variant.name)
+
+    @property
+    def island_model_name(self) -> str:
+        """Name of the island model in results."""
+        return island_model_name(self.island_model)
 
     @shared_property
     def sums(self) -> Sums:
@@ -79,10 +106,7 @@ class Mbma(Theory):
         """The same theory, but with NaN instead of errors for islands that are not covered."""
         if self.outside != "raise":
             return self
-        return Mbma(self.island_model, self.variant, self.rtol, "nan")
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Mbma, (self.island_model, self.variant, self.rtol, self.outside)
+        return dataclasses.replace(self, outside="nan")
 
     def totals(
         self,
