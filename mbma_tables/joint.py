@@ -24,7 +24,6 @@ from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.plots import draw_panels
 from mbma_tables.common.units import (
     HEAT_CONDUCTANCE,
-    UNKNOWN,
     Units,
     factor,
     force_over_area,
@@ -41,7 +40,6 @@ from mbma_tables.contacts.sensitivity import (
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import law_of
 from mbma_tables.materials import Pair, effective_modulus
-from mbma_tables.quantities import registry
 from mbma_tables.quantities.interface import Gas, Interface
 from mbma_tables.quantities.properties import JointQuantities
 from mbma_tables.quantities.tangential import (
@@ -53,7 +51,7 @@ from mbma_tables.scenes.specimen import read_toml
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import TOPS
 from mbma_tables.surfaces.surface import Surface, assumptions
-from mbma_tables.theories import OF_MAPS, THEORIES, get_theory
+from mbma_tables.theories import OF_MAPS, THEORIES, get_theory, theory_text
 from mbma_tables.theories.base import Theory
 
 if TYPE_CHECKING:
@@ -68,6 +66,17 @@ EXAMPLE = '{"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um
 # pressures over the hardness, and their number, in pictures
 RANGE = (1e-5, 0.3)
 POINTS = 41
+# quantities in pictures, those that share a panel together
+DRAWN = (
+    "area",
+    "mean_separation",
+    "unloading_stiffness",
+    "tangential_stiffness",
+    "stiffness",
+    "total_conductance",
+    "solid_conductance",
+    "gas_conductance",
+)
 
 
 def equivalent(faces: Sequence[Any], nominal_area: Any) -> AnySurface:
@@ -83,14 +92,6 @@ def equivalent(faces: Sequence[Any], nominal_area: Any) -> AnySurface:
     else:
         surface = dataclasses.replace(faces[0], h_max=None, nominal_area=nominal_area)
     return surface
-
-
-def _relative_scatter(pressed: Contact, name: str) -> Any:
-    """Standard deviation of ln(quantity), as pictures draw it; None of quantities without one."""
-    if registry.get(name).uncertainty is None:
-        return None
-    scatter = pressed.scatter_of(name)
-    return scatter / pressed.mean_separation if name == "mean_separation" else scatter
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -586,7 +587,7 @@ class Joint(JointQuantities, Displayed):
         for name, variable in self.quantities(pressed).items():
             dims = ("pressure",) if np.ndim(variable.values) else ()
             variables[name] = variable._replace(dims=dims)
-        return dataset_of(variables, self.facts())
+        return dataset_of(variables, self.facts_of(pressed))
 
     def quantities(self, pressed: Contact) -> dict[str, Variable]:
         """Values, units, meanings and model uncertainties of a contact of this joint, by name."""
@@ -658,12 +659,19 @@ class Joint(JointQuantities, Displayed):
         in_units = self._in_units
         facts["E_star"] = f"{float(in_units.E_star):.4g} {in_units.units.stress}"
         facts["hardness"] = "infinite" if hardness is None else str(hardness)
-        facts["theory"] = chosen_theory(self.surface, self.theory).name
+        facts["theory"] = theory_text(self.surface, self.theory)
         facts["gas"] = Gas.of(self.gas).name
         facts["surface"] = repr(self.surface)
         assumed = assumptions(self.surface)
         if assumed:
             facts["assumed"] = "; ".join(assumed)
+        return facts
+
+    def facts_of(self, pressed: Contact) -> dict[str, str]:
+        """The facts of the joint with what is known of a contact of it: the theory by which it was computed, and the loading."""
+        facts = self.facts() | {"theory": pressed.theory}
+        if pressed.loading:
+            facts["loading"] = pressed.loading
         return facts
 
     _facts = facts
@@ -675,43 +683,10 @@ class Joint(JointQuantities, Displayed):
         return self._drawn(self._range())
 
     def _drawn(self, pressed: Contact) -> Figure:
-        variables = self.quantities(pressed)
-        x = variables["pressure"]
-        stiffness = variables["stiffness"]
-        gap = variables["mean_separation"]
-        panels = {
-            "real contact area  A/A0": ("area",),
-            f"mean gap [{gap.unit}]": ("mean_separation",),
-            f"stiffness [{stiffness.unit}]": (
-                "unloading_stiffness",
-                "tangential_stiffness",
-                "stiffness",
-            ),
-            f"thermal conductance [{HEAT_CONDUCTANCE.unit(UNKNOWN)}]": (
-                "total_conductance",
-                "solid_conductance",
-                "gas_conductance",
-            ),
-        }
-        lines = {}
-        for label, names in panels.items():
-            # quantities whose needs were given; a logarithmic axis has no zeros, such as
-            # the conductance of a vacuum
-            drawn = [
-                name
-                for name in names
-                if name in variables and np.any(variables[name].values > 0)
-            ]
-            if drawn:
-                lines[label] = [
-                    (
-                        name.replace("_", " "),
-                        variables[name].values,
-                        _relative_scatter(pressed, name),
-                    )
-                    for name in drawn
-                ]
-        return draw_panels(x.values, lines, f"pressure F/A0 [{x.unit}]")
+        unit = pressed.units["pressure"]
+        return draw_panels(
+            np.ravel(pressed.pressure), pressed.panels(DRAWN), f"pressure F/A0 [{unit}]"
+        )
 
 
 Joint.__init__ = hinted(Joint.__init__)  # type: ignore[method-assign]

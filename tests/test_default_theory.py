@@ -118,7 +118,9 @@ def test_a_joint(expected, make):
     metals = "steel 4140 hard"
     joint = Joint(surface, bodies=metals)
     found = joint.at_pressure(PRESSURE)
-    assert (found.theory, joint.facts()["theory"]) == (expected, expected)
+    assert found.theory == expected
+    # of maps that are simulated if that converges both names
+    assert expected in joint.facts()["theory"]
     assert found.area == contact(surface, joint.bodies, pressure=PRESSURE).area
     assert found.area == contact(surface, metals, pressure=PRESSURE).area
     assert joint.table([PRESSURE]).attrs["theory"] == expected

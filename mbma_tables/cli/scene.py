@@ -220,7 +220,7 @@ def joint_command(
     joint = Joint.from_toml(file)
     found = joint.at_pressure(pressure or [joint.pressure_of(each) for each in force])
     values, units = columns_of(found, uncertainties=True)
-    facts = joint.facts()
+    facts = joint.facts_of(found)
     # a line for each assumption, as of other commands
     assumed = assumptions(joint.surface)
     notes = [f"{name}: {text}" for name, text in facts.items() if name != "assumed"]

@@ -1,12 +1,12 @@
-"""Display of results: a line, a table with its picture, an xarray Dataset.
+"""Display of results: a line, a table, a picture, an xarray Dataset.
 
 A class that derives from `Displayed` defines its description (`_facts`), its quantities
-(`_variables`) and its picture (`_figure`).
+(`_variables`) and its picture (`_figure`). The description is what editors and notebooks
+show unasked: it neither solves a contact nor draws.
 """
 
 from __future__ import annotations
 
-import base64
 import dataclasses
 import html
 import inspect
@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from mbma_tables.common.arguments import is_labelled, needed
-from mbma_tables.common.errors import InputError, MbmaError
+from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
 from mbma_tables.common.plain_text import visible
 from mbma_tables.common.plots import KINDS, to_picture
@@ -26,8 +26,6 @@ from mbma_tables.common.plots import KINDS, to_picture
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
-
-SMALL = 55  # dots per inch of a notebook's picture
 
 
 class Variable(NamedTuple):
@@ -68,7 +66,7 @@ def quantity(meaning: str) -> Any:
 
 
 class Displayed:
-    """Base class with display as a line, a table with a picture, a figure and a Dataset."""
+    """Base class with display as a line, a table, a figure and a Dataset."""
 
     units: Any
     _dims: ClassVar[tuple[str, ...] | None] = None
@@ -128,13 +126,7 @@ class Displayed:
             f"style='text-align:left'>{html.escape(text)}</td></tr>"
             for name, text in self._facts().items()
         )
-        table = f"<div><b>{type(self).__name__}</b><table>{rows}</table>"
-        try:
-            picture = base64.b64encode(to_picture(self._figure(), dpi=SMALL)).decode()
-        # no curve, or no matplotlib: the table stands alone
-        except MbmaError:
-            return f"{table}</div>"
-        return f"{table}<img src='data:image/png;base64,{picture}'></div>"
+        return f"<div><b>{type(self).__name__}</b><table>{rows}</table></div>"
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
         """Plot the quantities and return the figure; `path` ("name.svg", .pdf, .png) saves it.

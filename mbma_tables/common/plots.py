@@ -10,7 +10,7 @@ import io
 import re
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -79,12 +79,20 @@ def draw_line(x: Any, y: Any, x_label: str, y_label: str) -> Figure:
     return figure
 
 
+class Line(NamedTuple):
+    """A line of a panel, with its band."""
+
+    name: str
+    values: FloatArray
+    scatter: FloatArray | None = None  # standard deviation of ln of the values
+
+
 def draw_panels(
     x: FloatArray,
-    panels: Mapping[str, Sequence[tuple[str, FloatArray, FloatArray | None]]],
+    panels: Mapping[str, Sequence[Line]],
     x_label: str,
 ) -> Figure:
-    """Panels by their ordinate's label; a line has a name, values, and scatter or None."""
+    """Panels by their ordinate's label."""
     figure = new_figure(5 * (len(panels) + 1) // 2, 8)
     for axes, (label, lines) in zip(
         figure.subplots(2, -(-len(panels) // 2)).flat, panels.items(), strict=False
@@ -105,12 +113,12 @@ def draw_compression(
     pressure_label: str = PRESSURE_LABEL,
     gap_label: str = GAP_LABEL,
     leakage_label: str = LEAKAGE_LABEL,
-    more: Mapping[str, Mapping[str, FloatArray]] = MappingProxyType({}),
+    more: Mapping[str, Sequence[Line]] = MappingProxyType({}),
 ) -> Figure:
     """Two panels: pressure against u/h_rms, and area against pressure (logarithmic).
 
     A third one, flow coefficient against pressure, where a curve has leakage, and one for
-    each label of `more`, with lines by name over the first curve's pressure. Points without
+    each label of `more`, with lines over the first curve's pressure. Points without
     contact, and blocked flow, have no place on a logarithmic axis and are left out.
     """
     if not curves:
@@ -148,8 +156,9 @@ def draw_compression(
             yscale="log",
         )
     for axes, (label, lines) in zip(others, more.items(), strict=True):
-        for name, values in lines.items():
-            axes.loglog(curves[0].pressure, values, marker=".", label=name)
+        for line in lines:
+            axes.loglog(curves[0].pressure, line.values, marker=".", label=line.name)
+            _band(axes, curves[0].pressure, line.values, line.scatter)
         axes.set(xlabel=pressure_label, ylabel=label)
     for axes in figure.axes:
         axes.grid(True, which="major", alpha=0.3)

@@ -13,7 +13,7 @@ from mbma_tables.bodies import Bodies
 from mbma_tables.common.arguments import FloatArray, hinted, number_in, require
 from mbma_tables.common.display import Displayed, Variable, quantity, shown
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.plots import draw_panels
+from mbma_tables.common.plots import Line, draw_panels
 from mbma_tables.common.units import unit_of
 from mbma_tables.contacts.contact import contact
 from mbma_tables.quantities.lay import LAY, OPEN, SHEAR, WIDEST_LAY, factors
@@ -113,17 +113,18 @@ class FlowFactors(Displayed):
             name: np.asarray(values[order], float)
             for name, (values, *_) in self._variables().items()
         }
-        panels: dict[str, list[tuple[str, FloatArray, FloatArray | None]]] = {
+        panels = {
             "pressure flow factor": [
-                (name, at[name], at["scatter"]) for name in ("phi_x", "phi_y")
+                Line(name, at[name], at["scatter"]) for name in ("phi_x", "phi_y")
             ],
             "shear flow factor": [
-                (name, at[name], at["shear_scatter"]) for name in ("shear_x", "shear_y")
+                Line(name, at[name], at["shear_scatter"])
+                for name in ("shear_x", "shear_y")
             ],
             f"asperity pressure [{self.units['pressure']}]": [
-                ("pressure", at["pressure"], at["pressure_scatter"])
+                Line("pressure", at["pressure"], at["pressure_scatter"])
             ],
-            "real contact area  A/A0": [("area", at["area"], None)],
+            "real contact area  A/A0": [Line("area", at["area"])],
         }
         return draw_panels(
             at["mean_separation"], panels, f"mean gap u [{self.units['mean_separation']}]"

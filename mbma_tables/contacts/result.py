@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from mbma_tables.common.display import Displayed, Variable, quantity, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import (
     Curve,
+    Line,
     draw_compression,
     new_figure,
     pressure_label,
@@ -49,7 +50,11 @@ if TYPE_CHECKING:
 # what yields depends on the heaviest load before: none is assumed, also where pressures of
 # one request fall
 FIRST_LOADING = "first; each pressure is reached from no contact"
-MOST_SHOWN = 10_000  # entries up to which the text includes errors, scatter and validity
+MOST_SHOWN = 1000  # entries up to which the text includes errors, scatter and validity
+OF_FALLING = ", also where a smaller one follows a larger one: that is no unloading"
+# labels of panels whose quantities do not end in it
+PANELS = {"area": "real contact area  A/A0", "mean_separation": "mean gap"}
+CONDUCTANCES = ("total_conductance", "solid_conductance", "gas_conductance")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -368,7 +373,8 @@ class Contact(State, Displayed):
         if np.all(self.area == 0):
             facts["contact"] = "none: the bodies are apart"
         facts["separation_scatter"] = self._shown("separation_scatter")
-        for name in ("stiffness", "unloading_stiffness", "solid_conductance"):
+        facts |= self._conductances()
+        for name in ("stiffness", "unloading_stiffness"):
             if registry.get(name).is_available(self):
                 facts[name] = self._shown(name)
         if not self.yields and self.bodies.units.stress != "1":
@@ -382,16 +388,37 @@ class Contact(State, Displayed):
                 )
         if self.elastic_theory.advice:
             facts["advice"] = self.elastic_theory.advice
-        conductance = registry.get("solid_conductance")
-        if self.bodies.conductivity_is_given and conductance.missing(self):
-            facts["solid_conductance"] = "needs the surface's unit"
         names = ["error", "scatter", "stiffness_scatter", "valid"]
         if self.yields:
             names += ["unloading_stiffness_scatter", "psi", "yielded"]
-            facts["loading"] = FIRST_LOADING
+            facts["loading"] = self.loading
         for name in names:
             facts[name] = self._shown(name)
         return facts
+
+    @property
+    def loading(self) -> str:
+        """How the pressures are reached, of contacts that yield, for texts; empty of elastic ones."""
+        if not self.yields:
+            return ""
+        pressures = np.asarray(self.pressure)
+        falling = pressures.ndim > 0 and bool((np.diff(pressures, axis=-1) < 0).any())
+        return FIRST_LOADING + (OF_FALLING if falling else "")
+
+    def _conductances(self) -> dict[str, str]:
+        """Each conductance and its scatter as text, the total first."""
+        if self.bodies.conductivity_is_given and registry.get(
+            "solid_conductance"
+        ).missing(self):
+            return {"solid_conductance": "needs the surface's unit"}
+        # without that of the solid, a gas alone is no conductance of the contact
+        given = self.bodies.conductivity_is_given
+        return {
+            shown_name: self._shown(shown_name)
+            for name in CONDUCTANCES
+            if given and registry.get(name).is_available(self)
+            for shown_name in (name, f"{name}_scatter")
+        }
 
     def _shown(self, name: str) -> str:
         """A quantity as text, with its unit."""
@@ -418,15 +445,39 @@ class Contact(State, Displayed):
     def _figure(self) -> Any:
         unit = self.units["pressure"]
         title = f"hardness {shown(self.bodies.hardness, unit)}" if self.yields else ""
+        names = ("stiffness", "unloading_stiffness", *CONDUCTANCES)
+        return draw_compression(
+            [self.curve()], title, pressure_label(unit), more=self.panels(names)
+        )
+
+    def panels(self, names: Sequence[str]) -> dict[str, list[Line]]:
+        """Lines of quantities by the label of their panel, with scatter, from light to heavy contacts.
+
+        Those without any positive value have no place on a logarithmic axis, such as the
+        conductance of a vacuum.
+        """
         order = np.argsort(-np.ravel(self.mean_separation), kind="stable")
-        lines: dict[str, dict[str, Any]] = {}
-        for name in ("stiffness", "unloading_stiffness", "solid_conductance"):
+        lines: dict[str, list[Line]] = {}
+        for name in names:
             declared = registry.get(name)
-            if declared.is_available(self):
-                label = f"{name.rpartition('_')[2]} [{declared.unit(self)}]"
-                values = np.ravel(self.quantity(name))[order]
-                lines.setdefault(label, {})[name.replace("_", " ")] = values
-        return draw_compression([self.curve()], title, pressure_label(unit), more=lines)
+            if not declared.is_available(self):
+                continue
+            values = np.ravel(self.quantity(name))
+            if not (values > 0).any():
+                continue
+            scatter = None
+            if declared.uncertainty is not None:
+                scatter = np.ravel(self.scatter_of(name))
+                scatter = (scatter / values if name == "mean_separation" else scatter)[
+                    order
+                ]
+            unit = declared.unit(self)
+            label = PANELS.get(name, name.rpartition("_")[2])
+            label += "" if unit == "1" else f" [{unit}]"
+            lines.setdefault(label, []).append(
+                Line(name.replace("_", " "), values[order], scatter)
+            )
+        return lines
 
     def curve(self, leakage: bool = False) -> Curve:
         """The line that plots draw, for one surface at several separations; optionally with its leakage."""

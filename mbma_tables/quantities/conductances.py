@@ -72,6 +72,17 @@ UNIT_OF_LENGTH = Need(
 
 @quantity(
     HEAT_CONDUCTANCE,
+    "thermal conductance of solid spots and gas in parallel, per nominal area",
+    needs=(THERMAL_CONDUCTIVITY, GAS),
+    uncertainty="total_conductance_scatter",
+)
+def total_conductance(contact: State) -> Any:
+    """Thermal conductance of the solid spots and of the gas in parallel [W/(m^2 K)]."""
+    return contact.solid_conductance + contact.gas_conductance
+
+
+@quantity(
+    HEAT_CONDUCTANCE,
     "conductance of the solid spots per nominal area",
     needs=(CONDUCTIVITY, UNIT_OF_CONDUCTANCE),
     uncertainty="solid_conductance_scatter",
@@ -108,14 +119,21 @@ def gas_conductance(contact: State) -> Any:
 
 
 @quantity(
-    HEAT_CONDUCTANCE,
-    "thermal conductance of solid spots and gas in parallel, per nominal area",
+    DIMENSIONLESS,
+    "model uncertainty: standard deviation of ln of the total conductance at this pressure",
     needs=(THERMAL_CONDUCTIVITY, GAS),
-    uncertainty="total_conductance_scatter",
+    is_column=False,
 )
-def total_conductance(contact: State) -> Any:
-    """Thermal conductance of the solid spots and of the gas in parallel [W/(m^2 K)]."""
-    return contact.solid_conductance + contact.gas_conductance
+def total_conductance_scatter(contact: State) -> Any:
+    """Model uncertainty, one standard deviation of ln `total_conductance` at this pressure.
+
+    Those of `solid_conductance` and `gas_conductance`, each times its share of the total, in
+    quadrature.
+    """
+    solid = contact.solid_conductance * contact.solid_conductance_scatter
+    gas = contact.gas_conductance * contact.gas_conductance_scatter
+    with np.errstate(invalid="ignore"):
+        return np.sqrt(solid**2 + gas**2) / contact.total_conductance
 
 
 @quantity(
@@ -157,24 +175,6 @@ def gas_conductance_scatter(contact: State) -> Any:
         return np.hypot(of_mean, exponent_of_gap(*gaps) * of_gap / gaps.u)
 
     return _of_gaps(contact, gas, scatter, contact.separation_scatter)
-
-
-@quantity(
-    DIMENSIONLESS,
-    "model uncertainty: standard deviation of ln of the total conductance at this pressure",
-    needs=(THERMAL_CONDUCTIVITY, GAS),
-    is_column=False,
-)
-def total_conductance_scatter(contact: State) -> Any:
-    """Model uncertainty, one standard deviation of ln `total_conductance` at this pressure.
-
-    Those of `solid_conductance` and `gas_conductance`, each times its share of the total, in
-    quadrature.
-    """
-    solid = contact.solid_conductance * contact.solid_conductance_scatter
-    gas = contact.gas_conductance * contact.gas_conductance_scatter
-    with np.errstate(invalid="ignore"):
-        return np.sqrt(solid**2 + gas**2) / contact.total_conductance
 
 
 def conductance_of_gas(contact: State, gas: Gas) -> Any:

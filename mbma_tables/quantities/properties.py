@@ -95,6 +95,12 @@ class ContactQuantities:
         return value
 
     @property
+    def total_conductance(self) -> Numbers:
+        """Thermal conductance of the solid spots and of the gas in parallel [W/(m^2 K)]."""
+        value: Numbers = self.quantity("total_conductance")
+        return value
+
+    @property
     def solid_conductance(self) -> Numbers:
         """Thermal or electrical conductance of the solid spots, h = (k_s/E*) (-dF/du), at constant contact area.
 
@@ -112,9 +118,13 @@ class ContactQuantities:
         return value
 
     @property
-    def total_conductance(self) -> Numbers:
-        """Thermal conductance of the solid spots and of the gas in parallel [W/(m^2 K)]."""
-        value: Numbers = self.quantity("total_conductance")
+    def total_conductance_scatter(self) -> Numbers:
+        """Model uncertainty, one standard deviation of ln `total_conductance` at this pressure.
+
+        Those of `solid_conductance` and `gas_conductance`, each times its share of the total, in
+        quadrature.
+        """
+        value: Numbers = self.quantity("total_conductance_scatter")
         return value
 
     @property
@@ -137,16 +147,6 @@ class ContactQuantities:
         uncertainty of the gas's conductivity and accommodation is not included.
         """
         value: Numbers = self.quantity("gas_conductance_scatter")
-        return value
-
-    @property
-    def total_conductance_scatter(self) -> Numbers:
-        """Model uncertainty, one standard deviation of ln `total_conductance` at this pressure.
-
-        Those of `solid_conductance` and `gas_conductance`, each times its share of the total, in
-        quadrature.
-        """
-        value: Numbers = self.quantity("total_conductance_scatter")
         return value
 
     @property
@@ -327,6 +327,21 @@ class LawQuantities:
         value: Numbers = contact.quantity("tangential_stiffness")
         return value
 
+    def total_conductance(
+        self: Any,
+        mean_separation: ArrayLike | str | None = None,
+        *,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
+    ) -> Numbers:
+        """Thermal conductance of the solid spots and of the gas in parallel [W/(m^2 K)]."""
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
+        value: Numbers = contact.quantity("total_conductance")
+        return value
+
     def solid_conductance(
         self: Any,
         mean_separation: ArrayLike | str | None = None,
@@ -362,7 +377,7 @@ class LawQuantities:
         value: Numbers = contact.quantity("gas_conductance")
         return value
 
-    def total_conductance(
+    def total_conductance_scatter(
         self: Any,
         mean_separation: ArrayLike | str | None = None,
         *,
@@ -370,11 +385,15 @@ class LawQuantities:
         pressure: ArrayLike | str | None = None,
         area: ArrayLike | None = None,
     ) -> Numbers:
-        """Thermal conductance of the solid spots and of the gas in parallel [W/(m^2 K)]."""
+        """Model uncertainty, one standard deviation of ln `total_conductance` at this pressure.
+
+        Those of `solid_conductance` and `gas_conductance`, each times its share of the total, in
+        quadrature.
+        """
         contact = self.at(
             mean_separation, separation=separation, pressure=pressure, area=area
         )
-        value: Numbers = contact.quantity("total_conductance")
+        value: Numbers = contact.quantity("total_conductance_scatter")
         return value
 
     def solid_conductance_scatter(
@@ -415,25 +434,6 @@ class LawQuantities:
             mean_separation, separation=separation, pressure=pressure, area=area
         )
         value: Numbers = contact.quantity("gas_conductance_scatter")
-        return value
-
-    def total_conductance_scatter(
-        self: Any,
-        mean_separation: ArrayLike | str | None = None,
-        *,
-        separation: ArrayLike | str | None = None,
-        pressure: ArrayLike | str | None = None,
-        area: ArrayLike | None = None,
-    ) -> Numbers:
-        """Model uncertainty, one standard deviation of ln `total_conductance` at this pressure.
-
-        Those of `solid_conductance` and `gas_conductance`, each times its share of the total, in
-        quadrature.
-        """
-        contact = self.at(
-            mean_separation, separation=separation, pressure=pressure, area=area
-        )
-        value: Numbers = contact.quantity("total_conductance_scatter")
         return value
 
     def flow_coefficient(
@@ -644,6 +644,11 @@ class JointQuantities:
         value: Numbers = self.at_pressure(pressure).quantity("energy")
         return value
 
+    def total_conductance(self: Any, pressure: ArrayLike | str) -> Numbers:
+        """Thermal conductance of the solid spots and of the gas in parallel [W/(m^2 K)]."""
+        value: Numbers = self.at_pressure(pressure).quantity("total_conductance")
+        return value
+
     def solid_conductance(self: Any, pressure: ArrayLike | str) -> Numbers:
         """Thermal or electrical conductance of the solid spots, h = (k_s/E*) (-dF/du), at constant contact area.
 
@@ -659,9 +664,13 @@ class JointQuantities:
         value: Numbers = self.at_pressure(pressure).quantity("gas_conductance")
         return value
 
-    def total_conductance(self: Any, pressure: ArrayLike | str) -> Numbers:
-        """Thermal conductance of the solid spots and of the gas in parallel [W/(m^2 K)]."""
-        value: Numbers = self.at_pressure(pressure).quantity("total_conductance")
+    def total_conductance_scatter(self: Any, pressure: ArrayLike | str) -> Numbers:
+        """Model uncertainty, one standard deviation of ln `total_conductance` at this pressure.
+
+        Those of `solid_conductance` and `gas_conductance`, each times its share of the total, in
+        quadrature.
+        """
+        value: Numbers = self.at_pressure(pressure).quantity("total_conductance_scatter")
         return value
 
     def solid_conductance_scatter(self: Any, pressure: ArrayLike | str) -> Numbers:
@@ -682,15 +691,6 @@ class JointQuantities:
         uncertainty of the gas's conductivity and accommodation is not included.
         """
         value: Numbers = self.at_pressure(pressure).quantity("gas_conductance_scatter")
-        return value
-
-    def total_conductance_scatter(self: Any, pressure: ArrayLike | str) -> Numbers:
-        """Model uncertainty, one standard deviation of ln `total_conductance` at this pressure.
-
-        Those of `solid_conductance` and `gas_conductance`, each times its share of the total, in
-        quadrature.
-        """
-        value: Numbers = self.at_pressure(pressure).quantity("total_conductance_scatter")
         return value
 
     def flow_coefficient(self: Any, pressure: ArrayLike | str) -> Numbers:

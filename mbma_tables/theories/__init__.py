@@ -171,3 +171,14 @@ def theory_name(
     from mbma_tables.theories.simulated.theory import is_default
 
     return "simulated" if is_default(surface) else "calibrated"
+
+
+def theory_text(surface: AnySurface, theory: str | Theory | UserTheory | None) -> str:
+    """The name of the theory of pressures and laws, for texts: a simulation that it may depend on is not made."""
+    if theory is None and getattr(surface, "table", None) is None:
+        from mbma_tables.theories.simulated.theory import is_for_simulation
+
+        if is_for_simulation(surface):
+            return "simulated, or calibrated if the simulation does not converge"
+    name_or_theory = theory_name(surface, theory)
+    return str(getattr(name_or_theory, "name", name_or_theory))

@@ -96,3 +96,43 @@ def test_conductances_without_a_gas_and_of_electricity():
     assert current.units["solid_conductance"] == "S/m^2"
     with pytest.raises(InputError, match="total_conductance needs thermal conductivity"):
         _ = current.total_conductance
+
+
+def test_the_total_is_shown_first_with_its_scatter():
+    """In text, tables and pictures of a joint in a gas; a vacuum has none to draw."""
+    joint = Joint(FACE, bodies=METAL, nominal_area=AREA)
+    found = joint.at_pressure(["10 MPa", "50 MPa"])
+    names = [name for name in found._facts() if "conductance" in name]
+    assert names[:2] == ["total_conductance", "total_conductance_scatter"]
+    assert names[2:] == [
+        f"{part}_conductance{end}"
+        for part in ("solid", "gas")
+        for end in ("", "_scatter")
+    ]
+    listed = [name for name in found.available() if name.endswith("conductance")]
+    assert listed == ["total_conductance", "solid_conductance", "gas_conductance"]
+    for figure in (joint.plot(pressures=("10 MPa", "50 MPa")), found.plot()):
+        (panel,) = (axes for axes in figure.axes if "conductance" in axes.get_ylabel())
+        lines = [line.get_label() for line in panel.lines]
+        assert lines == ["total conductance", "solid conductance", "gas conductance"]
+        # a band for each line
+        assert len(panel.collections) == 3
+        half_width = np.exp(float(found.total_conductance_scatter[0]))
+        ends = panel.collections[0].get_paths()[0].vertices[:, 1]
+        assert ends.min() == pytest.approx(found.total_conductance[0] / half_width)
+    alone = Joint(FACE, bodies=METAL, nominal_area=AREA, gas="vacuum")
+    (panel,) = (
+        axes
+        for axes in alone.plot(pressures=("10 MPa", "50 MPa")).axes
+        if "conductance" in axes.get_ylabel()
+    )
+    assert panel.lines[0].get_label() == "total conductance"
+    assert "gas conductance" not in [line.get_label() for line in panel.lines]
+
+
+def test_the_panel_of_a_current_has_its_unit():
+    """It was called thermal, in W/(m^2 K)."""
+    face = Joint(FACE, bodies=METAL, nominal_area=AREA).surface
+    joint = Joint(face, bodies=Bodies("30 GPa", conductivity="38e6 S/m"), gas="vacuum")
+    labels = [axes.get_ylabel() for axes in joint.plot(pressures=("1 MPa", "5 MPa")).axes]
+    assert "conductance [S/m^2]" in labels

@@ -89,7 +89,18 @@ class Simulated:
 
 
 def is_default(surface: AnySurface) -> bool:
-    """Whether simulation is the default: of a map that is resolved and pressed within seconds."""
+    """Whether simulation is the default: of a map of a kind for it, whose simulation converges."""
+    if not is_for_simulation(surface):
+        return False
+    try:
+        Simulated().of(surface)
+    except (ConvergenceError, OutOfRangeError):
+        return False
+    return True
+
+
+def is_for_simulation(surface: AnySurface) -> bool:
+    """Whether a surface has a map that is resolved and pressed within seconds."""
     from mbma_tables.theories.simulated.own_map import steps_along
 
     if not isinstance(surface, MeasuredSurface):
@@ -99,10 +110,4 @@ def is_default(surface: AnySurface) -> bool:
         return False
     if treated.heights.size > MOST_POINTS or min(treated.heights.shape) < LEAST_SIDE:
         return False
-    if steps_along(surface, treated) < MIN_POINTS * (1 - ROUNDING):
-        return False
-    try:
-        Simulated().of(surface)
-    except (ConvergenceError, OutOfRangeError):
-        return False
-    return True
+    return bool(steps_along(surface, treated) >= MIN_POINTS * (1 - ROUNDING))
