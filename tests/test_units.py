@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+import xarray as xr
 from helpers import refusals, refused, run, told
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -398,3 +399,61 @@ def test_a_surface_that_is_its_own_spectrum_has_the_same_rule(theory):
             mean_separation="600 nm",
             theory=theory,
         )
+
+
+@pytest.mark.parametrize(
+    ("text", "si", "unit"),
+    [
+        ("45 W/(m K)", 45.0, "W/(m^2 K)"), ("45 mW/(mm K)", 45.0, "W/(m^2 K)"), ("0.45 W/(cm K)", 45.0, "W/(m^2 K)"),
+        ("45 W/m/K", 45.0, "W/(m^2 K)"), ("0.045 kW/(m*K)", 45.0, "W/(m^2 K)"), ("58 MS/m", 58e6, "S/m^2"),
+        ("58e3 S/mm", 58e6, "S/m^2"),
+    ],
+)  # fmt: skip
+def test_conductivities_in_any_unit(text, si, unit):
+    for length, metre in (("um", 1e6), ("mm", 1e3)):
+        numbers, found = Units(length).conductivities(text, text)
+        assert found == unit
+        assert numbers == pytest.approx([si * metre] * 2, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    "pair",
+    [
+        ("45 W/(m K)", "6e7 S/m"), ("45 W/m", "45 W/m"), ("45 furlong", "45 furlong"), ("45 W/(parsec K)",) * 2,
+        (45.0, "45 W/(m K)"), ("45 mS/(m K)",) * 2, ("W/(m K)",) * 2,
+    ],
+)  # fmt: skip
+def test_conductivities_that_are_refused(pair):
+    with pytest.raises(InputError, match=r"conductivities are|no known unit of length"):
+        Units("um").conductivities(*pair)
+
+
+def test_units_of_data_arrays_have_powers():
+    face = {"hurst": 0.8, "q0": 0.06, "q1": 3.0, "h_rms": 1.0}
+    area = xr.DataArray([4.0, 5.0], dims="face")
+    for size, power in ((1e8, "um^2"), (1e8, "um2")):
+        stated = (size * area).assign_attrs(units=power)
+        found = Surface(**face, nominal_area=stated, unit="um").h_max
+        plain = Surface(**face, nominal_area=size * area.values, unit="um").h_max
+        np.testing.assert_array_equal(found, plain)
+    with pytest.raises(InputError, match=r"in 'mm\^2' by its .* asked for in 'um\^2'"):
+        Surface(**face, nominal_area=area.assign_attrs(units="mm^2"), unit="um")
+    with pytest.raises(InputError, match=r"q0 is in '1/mm' .* asked for in '1/um'"):
+        Surface(
+            **face | {"q0": xr.DataArray([0.06], dims="face", attrs={"units": "1/mm"})},
+            h_max=3.0,
+            unit="um",
+        )
+    one = Surface(**face, h_max=3.0, unit="um")
+    gaps = xr.DataArray([1.9, 2.0], dims="gap", attrs={"units": "GPa"})
+    with pytest.raises(InputError, match="no known unit of length but one of stress"):
+        contact(one, mean_separation=gaps)
+    pressures = xr.DataArray([1.0], dims="p", attrs={"units": "kN/m^2"})
+    with pytest.raises(InputError, match="no known unit of stress"):
+        contact(one, "1 GPa", pressure=pressures)
+    # what the library wrote of numbers without a unit is a number without a unit
+    bare = Surface(**face, h_max=3.0)
+    loads = xr.DataArray([1e-5, 1e-4], dims="load")
+    u = contact(bare, pressure=loads).mean_separation
+    assert u.attrs["units"] == "length"
+    np.testing.assert_array_equal(contact(one, mean_separation=u).mean_separation, u)

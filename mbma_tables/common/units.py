@@ -80,10 +80,11 @@ _NAMES_OF_POWERS = {
 DIMENSIONS: dict[str, tuple[int, int]] = {}
 for _powers, _names in _NAMES_OF_POWERS.items():
     DIMENSIONS |= dict.fromkeys(_names.split(), _powers)
-CONDUCTIVITIES = {
-    "W/mK": "W/(m^2 K)",
-    "S/m": "S/m^2",
-}  # and the unit of conductance, over a length in metres
+# of conductivities, and the unit of conductance, over a length in metres
+CONDUCTIVITIES = {"W": "W/(m^2 K)", "S": "S/m^2"}
+PREFIXES = {"u": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
+# "mW/(mm K)", "W/m/K" and "MS/m" without spaces, brackets and asterisks
+_CONDUCTIVITY = re.compile(r"([umkM]?)(?:(W)/([a-z]+)/?K|(S)/([a-z]+))")
 _ASCII = str.maketrans(
     {"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "²": "2"}
 )
@@ -134,21 +135,37 @@ def read(name: str, text: str) -> tuple[float, str | None]:
         )
     if not rest:
         return number, None
+    return number, _base_unit(name, rest, text)
+
+
+def _base_unit(name: str, unit: str, text: str) -> str:
+    """The unit of length or stress in that of a named quantity: "mm" of "mm^2", "1/mm^2" or "mm-2"."""
     length, stress = DIMENSIONS.get(name, (0, 0))
     if not (length or stress):
-        raise InputError(f"{name} has no unit: leave {rest!r} out")
+        raise InputError(f"{name} has no unit: leave {unit!r} out")
     kind, power = ("length", length) if length else ("stress", stress)
-    base = rest.translate(_ASCII).replace("**", "^")
+    base = unit.translate(_ASCII).replace("**", "^")
     if power == 1:
-        return number, known(base, kind)
+        return known(base, kind)
     # 1/mm^2, /mm2, mm^-2 and mm-2 for power -2
     whole = re.fullmatch(r"(1? ?/ ?)?(.*?)\^?(-?\d+)?", base)
     if whole is not None and int(whole[3] or 1) * (-1 if whole[1] else 1) == power:
-        return number, known(whole[2], kind)
+        return known(whole[2], kind)
     sample = unit_of(
         name, Units(next(iter(SIZES["length"])), next(iter(SIZES["stress"])))
     )
     raise InputError(f"{name} = {text!r}: the unit must be like {sample}")
+
+
+def _base_of_attribute(name: str, value: Any) -> str | None:
+    """The unit of length or stress in the attribute `units` of a DataArray, None where it states none."""
+    stated = getattr(value, "attrs", {}).get("units")
+    if not isinstance(stated, str) or not any(DIMENSIONS.get(name, ())):
+        return None
+    # "length^2" is that of results whose unit is not known
+    if stated.strip() in ("", "1", unit_of(name, UNKNOWN)):
+        return None
+    return _base_unit(name, stated.strip(), stated)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -186,18 +203,13 @@ class Units:
         length, power = DIMENSIONS.get(name, (0, 0))
         kind, target_unit = ("length", self.length) if length else ("stress", self.stress)
         if not isinstance(value, str):
-            # of a DataArray
-            stated = getattr(value, "attrs", {}).get("units")
-            if (
-                target_unit in SIZES[kind]
-                and stated in SIZES[kind]
-                and (length or power) == 1
-                and stated != target_unit
-            ):
-                raise InputError(
-                    f"{name} is in {stated!r} by its attribute units, and asked for in "
-                    f"{target_unit!r}: convert it"
-                )
+            if target_unit in SIZES[kind]:
+                base = _base_of_attribute(name, value)
+                if base not in (None, target_unit):
+                    raise InputError(
+                        f"{name} is in {value.attrs['units']!r} by its attribute units, and "
+                        f"asked for in {unit_of(name, self)!r}: convert it"
+                    )
             return value
         number, unit = read(name, value)
         if unit is None:
@@ -227,24 +239,37 @@ class Units:
         """Conductivities and their unit over this unit of length, an SI unit for texts."""
         if not any(isinstance(value, str) for value in conductivities):
             return list(conductivities), f"conductivity/{unit_of('separation', self)}"
-        matches: list[Any] = [_NUMBER.fullmatch(str(value)) for value in conductivities]
-        names = {
-            re.sub(r"[\s()*]", "", each[2]).replace("/m/K", "/mK") if each else ""
-            for each in matches
-        }
-        if len(names) > 1 or not names <= CONDUCTIVITIES.keys():
-            allowed = "numbers, or texts in one unit such as '45 W/(m K)' or '6e7 S/m'"
-            raise InputError(
-                f"conductivities are {allowed}, got {' and '.join(map(repr, conductivities))}"
-            )
         if self.length is None:
             raise InputError(
                 f"conductivity {conductivities[0]!r} beside lengths whose unit is not known: give "
                 "the surface its unit"
             )
-        return [
-            float(each[1]) * factor("m", self.length) for each in matches
-        ], CONDUCTIVITIES[names.pop()]
+        numbers = []
+        kinds = set()
+        for value in conductivities:
+            number, kind = _conductivity_per_metre(value)
+            numbers.append(number * factor("m", self.length))
+            kinds.add(kind)
+        if len(kinds) > 1:
+            raise InputError(
+                "conductivities are both thermal or both electrical, got "
+                f"{' and '.join(map(repr, conductivities))}"
+            )
+        return numbers, CONDUCTIVITIES[kinds.pop()]
+
+
+def _conductivity_per_metre(value: Any) -> tuple[float, str]:
+    """A conductivity in W/(m K) or S/m, and which of both by its first letter."""
+    match = _NUMBER.fullmatch(value) if isinstance(value, str) else None
+    unit = _CONDUCTIVITY.fullmatch(re.sub(r"[\s()*]", "", match[2])) if match else None
+    if match is None or unit is None:
+        raise InputError(
+            "conductivities are numbers, or texts such as '45 W/(m K)', '45 mW/(mm K)' or "
+            f"'6e7 S/m', got {value!r}"
+        )
+    prefix, watt, metre, siemens, other = unit.groups()
+    number = float(match[1]) * PREFIXES[prefix]
+    return number / factor(metre or other, "m"), watt or siemens
 
 
 UNKNOWN = Units()
@@ -292,8 +317,8 @@ def _named(name: str, value: Any, kind: str) -> str | None:
         return None
     if isinstance(value, str):
         return read(name, value)[1]
-    stated = getattr(value, "attrs", {}).get("units")
-    return stated if stated in SIZES[kind] else None
+    length, _ = DIMENSIONS.get(name, (0, 0))
+    return _base_of_attribute(name, value) if (kind == "length") == bool(length) else None
 
 
 def stated_unit(name: str, value: Any) -> str | None:

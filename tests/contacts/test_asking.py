@@ -137,8 +137,8 @@ def test_conductance_is_per_unit_of_length_and_in_SI_of_texts():
     assert labelled.solid_conductance.dims == ("load",)
     for bad, says in (
         ((45.0, "167 W/(m K)"), "got 45.0"),
-        ("45 W/K", "texts in one unit such as '45 W/"),
-        (("45 W/(m K)", "6e7 S/m"), "in one unit"),
+        ("45 W/K", "texts such as '45 W/"),
+        (("45 W/(m K)", "6e7 S/m"), "both thermal or both electrical"),
         (-1.0, "k1 must be positive"),
         ((45.0, [1.0, 0.0]), "k2 must be positive, got 0 at (1,)"),
         ((45.0, np.nan), "k2 must be finite"),
