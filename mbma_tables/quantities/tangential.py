@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import (
     FloatArray,
     Numbers,
+    finite_array,
     is_labelled,
     number_in,
     require,
@@ -144,7 +145,7 @@ class Tangential:
         given = self.units.number(name, value)
         if is_labelled(given):
             return given
-        array = np.asarray(given, dtype=float)
+        array = finite_array(name, given)
         require(name, array, array >= 0, "at least 0")
         return array
 

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import functools
 import importlib
+import reprlib
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -27,6 +29,7 @@ from mbma_tables.theories import inversion, tested
 from mbma_tables.theories.evidence import shipped_deviations
 from mbma_tables.theories.inversion import FEW_LOOKS, LOOKS, Curve, Indices
 
+PACKAGE = "mbma_tables."
 ROUNDING = 4 * float(np.finfo(float).eps)  # relative, of gaps beside the ends of a domain
 
 
@@ -78,6 +81,27 @@ class UserTheory(Protocol):
         """F/(A0 E*) and A/A0 at mean separations u [length] of the surface's broadcast shape."""
 
 
+def _with_four_fields(answer: Callable[..., Any]) -> Callable[..., TheoryAnswer]:
+    """An `answer` of a user's subclass whose results are checked to be those of a `Theory`."""
+
+    @functools.wraps(answer)
+    def checked(
+        theory: Theory, surface: AnySurface, mean_separation: FloatArray
+    ) -> TheoryAnswer:
+        fields = answer(theory, surface, mean_separation)
+        if not isinstance(fields, tuple | list) or len(fields) != len(
+            TheoryAnswer._fields
+        ):
+            raise InputError(
+                f"theory {theory.name!r}, a Theory, must answer a TheoryAnswer of pressure, "
+                "area, stiffness and error; one that knows pressure and area alone is no "
+                f"subclass of Theory, got {reprlib.repr(fields)}"
+            )
+        return TheoryAnswer(*fields)
+
+    return checked
+
+
 class Theory(abc.ABC):
     """A theory, with quantities derived from its forces.
 
@@ -97,6 +121,12 @@ class Theory(abc.ABC):
     bends_in_area = False  # whether at its `bends` only the area is not smooth
     # whether force vanishes at u = h_max; else its Gaussian heights are unbounded
     ends_at_h_max = True
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Check what the `answer` of a user's subclass returns, which all else unpacks."""
+        super().__init_subclass__(**options)
+        if "answer" in vars(cls) and not cls.__module__.startswith(PACKAGE):
+            cls.answer = _with_four_fields(cls.answer)  # type: ignore[method-assign]
 
     @property
     def options(self) -> dict[str, Any]:

@@ -97,9 +97,7 @@ class Wrapped(Theory):
         pressure, area = self._forces_and_areas(surface, u)
 
         def force(x: FloatArray, place: FloatArray) -> FloatArray:
-            return np.broadcast_to(
-                self._theory.answer(select(surface, u.shape, place), x)[0], x.shape
-            )
+            return self._forces_and_areas(select(surface, u.shape, place), x)[0]
 
         place = np.arange(float(u.size)).reshape(u.shape)
         step = 0.01 * np.asarray(surface.h_rms)
@@ -126,9 +124,7 @@ class Wrapped(Theory):
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
 
         def values(u: FloatArray) -> tuple[Any, Any, bool]:
-            found = np.asarray(
-                self._theory.answer(surface, u)[int(quantity == "area")], dtype=float
-            )
-            return np.broadcast_to(found, u.shape), np.full(u.shape, np.nan), False
+            value = self._forces_and_areas(surface, u)[int(quantity == "area")]
+            return value, np.full(u.shape, np.nan), False
 
         return values

@@ -694,3 +694,41 @@ def test_labels_of_conductivities_and_of_a_gas_are_kept():
     plain = contact(face, "100 GPa", pressure=[0.01, 0.02], theory="calibrated")
     with pytest.raises(InputError, match="do not broadcast"):
         plain.gap_conductance("air", [300.0, 400.0, 500.0])
+
+
+class Linear(Theory):
+    """Force and area proportional to the depth."""
+
+    name = "linear"
+
+    def answer(self, surface, mean_separation):
+        depth = np.maximum(np.asarray(surface.h_max) - mean_separation, 0)
+        return TheoryAnswer(depth, 0.1 * depth, np.ones_like(depth), 0.0 * depth)
+
+
+class Paired(Linear):
+    def answer(self, surface, mean_separation):
+        return super().answer(surface, mean_separation)[:2]
+
+
+class Odd:
+    name = "odd"
+
+    def __init__(self, answered):
+        self.answered = answered
+
+    def answer(self, surface, mean_separation):
+        return self.answered
+
+
+@pytest.mark.parametrize("asked", ["pressure", "area", "mean_separation"])
+@pytest.mark.parametrize(
+    "theory",
+    [Paired(), *map(Odd, (None, 1.0, (1.0,), (1.0, 2.0, 3.0), ("a", "b"), (np.ones(7), np.ones(7))))],
+)  # fmt: skip
+def test_theories_whose_answers_are_none_are_named(theory, asked):
+    assert contact(SURFACE, area=0.05, theory=Linear()).pressure == pytest.approx(0.5)
+    with pytest.raises(InputError, match=f"theory '{theory.name}'.* must answer"):
+        _ = contact(SURFACE, **{asked: [0.01, 0.02]}, theory=theory).stiffness
+    with pytest.raises(InputError, match=f"theory '{theory.name}'.* must answer"):
+        contact_law(SURFACE, theory=theory)

@@ -390,3 +390,15 @@ def test_the_correlation_follows_the_model_it_was_fitted_to():
     assert (1.45 * area**0.985 * slope / joint.h_rms / plastic).min() == pytest.approx(
         0.72, abs=0.005
     )
+
+
+@pytest.mark.parametrize("method", ["shear", "displacement", "energy_loss"])
+@pytest.mark.parametrize(
+    "odd",
+    [{}, [], 1j, b"x", None, True, "abc", "1 furlong", [[1.0], [1.0, 2.0]], np.inf, np.nan, np.ma.masked_all(2)],
+    ids=str,
+)  # fmt: skip
+def test_odd_displacements_and_shears_are_refused_by_name(method, odd):
+    sheared = contact(FACE, Bodies("100 GPa", nu=0.3), area=0.01).tangential(friction=0.2)
+    with pytest.raises(InputError, match=r"displacement|shear|no known unit"):
+        getattr(sheared, method)(odd)
