@@ -38,7 +38,10 @@ def test_it_answers_what_was_simulated(truth):
     np.testing.assert_allclose(found.area, area, rtol=1e-9)
     # the first and the last load are beyond what was tested
     assert found.valid.tolist() == [False] + [True] * (force.size - 2) + [False]
-    assert list(found.reasons) == ["A/A0 is below 0.001", "A/A0 is above 0.9"]
+    assert list(found.reasons) == [
+        "A/A0 is below 0.001, the lightest contact that was tested",
+        "A/A0 is above 0.9, the heaviest contact that was tested",
+    ]
     assert found.theory == "simulated"
 
 
