@@ -43,6 +43,14 @@ class OutOfRangeError(InputError):
         self.mask = mask
 
 
+class MissingError(InputError, AttributeError):
+    """A quantity that a contact does not have, since what it needs was not given.
+
+    It is an `AttributeError`, so that ``hasattr(contact, "solid_conductance")`` and
+    ``getattr(contact, "energy", None)`` answer as Python's protocols want it.
+    """
+
+
 class ConvergenceError(MbmaError, ArithmeticError):
     """An iteration that did not reach its tolerance.
 

@@ -20,7 +20,7 @@ from mbma_tables.common.arguments import (
     is_labelled,
 )
 from mbma_tables.common.display import Displayed, Variable, quantity, shown
-from mbma_tables.common.errors import InputError
+from mbma_tables.common.errors import InputError, MissingError
 from mbma_tables.common.plots import (
     Curve,
     Line,
@@ -30,6 +30,7 @@ from mbma_tables.common.plots import (
     theory_label,
 )
 from mbma_tables.common.progress import shown as progress
+from mbma_tables.contacts.question import GAPS, both_separations
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.quantities import registry
 from mbma_tables.quantities.interface import NOTHING_BETWEEN, Gas, Interface
@@ -152,6 +153,9 @@ class Contact(State, Displayed):
         return self._values[name]
 
     def __getattr__(self, name: str) -> Any:
+        # Python asks here, too, where a property ended with MissingError: it says what is missing
+        if hasattr(type(self), name):
+            return getattr(type(self), name).__get__(self, type(self))
         # quantities that are declared elsewhere than in this package have no typed property
         if name.startswith("_") or name not in registry.registry():
             raise AttributeError(
@@ -172,6 +176,32 @@ class Contact(State, Displayed):
         return value.rename(name).assign_attrs(
             long_name=declared.meaning, units=declared.unit(self)
         )
+
+    def answered(self, name: str) -> Any:
+        """A separation, pressure, area or error, from the separation that the contact was made with.
+
+        Raises
+        ------
+        MissingError
+            For a contact made with neither separation.
+        """
+        gap = next((gap for gap in GAPS if gap in self._values), None)
+        if gap is None:
+            given = ", ".join(self._values) or "nothing"
+            raise MissingError(
+                f"{name} needs one of {', '.join(GAPS)}, which is missing: "
+                f"this contact was made with {given}"
+            )
+        if name in GAPS:
+            d, u = both_separations(
+                gap,
+                self._values[gap],
+                self.surface.h_max,
+                self.elastic_theory.ends_at_h_max,
+            )
+            return {"separation": d, "mean_separation": u}[name]
+        field = getattr(self.answer, name)
+        return self.E_star * field if name == "pressure" else field
 
     def scatter_of(self, name: str) -> Any:
         """Model uncertainty of a quantity by its name; NaN where it is not known."""

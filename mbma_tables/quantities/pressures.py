@@ -19,13 +19,13 @@ def _yields(contact: State) -> bool:
 @quantity(STRESS, "force over nominal area", uncertainty="scatter")
 def pressure(contact: State) -> Any:
     """F/A0 in the unit of E*; F/(A0 E*) where that is 1."""
-    return contact.quantity("pressure")
+    return contact.answered("pressure")
 
 
 @quantity(DIMENSIONLESS, "real over nominal contact area", uncertainty="area_scatter")
 def area(contact: State) -> Any:
     """A/A0; that of MBMA does not end at 1 under full compression, and is not clamped."""
-    return contact.quantity("area")
+    return contact.answered("area")
 
 
 @quantity(

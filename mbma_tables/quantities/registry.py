@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from mbma_tables.common.arguments import require_name
-from mbma_tables.common.errors import InputError
+from mbma_tables.common.errors import MissingError
 from mbma_tables.common.units import Dimension, Units
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ class Quantity:
         if missing := self.missing(state):
             remedies = "; ".join(need.remedy for need in missing)
             names = " and ".join(need.name for need in missing)
-            raise InputError(f"{self.name} needs {names}, which is missing: {remedies}")
+            raise MissingError(f"{self.name} needs {names}, which is missing: {remedies}")
         return self.compute(state)
 
     def unit(self, state: State) -> str:

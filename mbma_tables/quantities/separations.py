@@ -12,13 +12,13 @@ LENGTH = Dimension(length=1)
 @quantity(LENGTH, "mean gap u = (h_max + d)/2", uncertainty="separation_scatter")
 def mean_separation(contact: State) -> Any:
     """Mean separation u = (h_max + d)/2 (50) [length]: the mean gap, with yielded points flattened."""
-    return contact.quantity("mean_separation")
+    return contact.answered("mean_separation")
 
 
 @quantity(LENGTH, "d, rigid plane to mid-plane")
 def separation(contact: State) -> Any:
     """Separation d between the rigid plane and the mid-plane [length]."""
-    return contact.quantity("separation")
+    return contact.answered("separation")
 
 
 @quantity(

@@ -50,6 +50,10 @@ class State(ContactQuantities, abc.ABC):
         """Flow through the gaps of the contact."""
 
     @abc.abstractmethod
+    def answered(self, name: str) -> Any:
+        """One of the quantities that contacts are made with, where this one was made without it."""
+
+    @abc.abstractmethod
     def quantity(self, name: str) -> Any:
         """A quantity by its name, computed when it is first asked for."""
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from mbma_tables.common.errors import InputError
+from mbma_tables.common.errors import MissingError
 from mbma_tables.common.units import Dimension
 from mbma_tables.quantities.registry import Need, quantity
 from mbma_tables.quantities.state import State
@@ -69,7 +69,7 @@ def tangential_stiffness(contact: State) -> Any:
 def energy(contact: State) -> Any:
     """Elastic energy per nominal area [stress length], the integral of F/A0 over u; of elastic contacts alone."""
     if contact.yields:
-        raise InputError(ENERGY_OF_YIELDED)
+        raise MissingError(ENERGY_OF_YIELDED)
     return contact.evaluate(
         lambda theory, surface, u, E_star: (E_star * theory.energy(surface, u),)
     )[0]

@@ -24,7 +24,7 @@ def scatter_of_theory(contact: State, quantity_of_theory: str) -> Any:
 @quantity(DIMENSIONLESS, "bound on the relative numerical error against the theory")
 def error(contact: State) -> Any:
     """Bound on the relative numerical error of pressure and area against the theory; NaN where not known."""
-    return contact.quantity("error")
+    return contact.answered("error")
 
 
 @quantity(

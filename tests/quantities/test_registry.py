@@ -1,5 +1,6 @@
 """The registry of quantities: what is declared once shows everywhere."""
 
+import inspect
 import json
 
 import numpy as np
@@ -15,6 +16,7 @@ from mbma_tables.common.units import (
     Dimension,
     Units,
 )
+from mbma_tables.contacts.result import Contact, Setup
 from mbma_tables.quantities import registry
 
 FACE = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5, unit="um")
@@ -137,3 +139,50 @@ def test_bodies_are_what_people_type():
     assert metals.solid_conductance == same.solid_conductance
     with pytest.raises(InputError, match="give one of them"):
         Bodies("100 GPa", metals="silver")
+
+
+def contacts_of_all_kinds():
+    """Without units, of metals, elastic and yielded, of a law and of a joint."""
+    plain = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5)
+    face = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5, unit="um")
+    yield contact(plain, pressure=0.001)
+    yield contact(face, "steel 4140 hard", pressure="1 MPa")
+    yield contact(face, separation=0.4)
+    yield contact_law(face, "1 GPa").at(1.0)
+    yield Joint(face, bodies="steel 4140 hard").at_pressure("1 MPa")
+
+
+def test_what_a_contact_lacks_is_no_attribute_of_it():
+    """hasattr, getattr with a default and inspect.getmembers ended with an InputError."""
+    for pressed in contacts_of_all_kinds():
+        assert "area" in dict(inspect.getmembers(pressed))
+        for name in registry.registry():
+            has = hasattr(pressed, name)
+            assert has or getattr(pressed, name, 7) == 7
+            if name in pressed.available():
+                assert has
+            if not has:
+                with pytest.raises(InputError, match=name):
+                    pressed.quantity(name)
+    with pytest.raises(AttributeError, match="no_such"):
+        _ = pressed.no_such
+
+
+def test_a_contact_made_of_one_quantity_has_the_others():
+    """Those that it was made without returned themselves, without end."""
+    whole = contact(
+        Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5, unit="um"),
+        "100 GPa",
+        pressure="10 MPa",
+        theory="calibrated",
+    )
+    names = ("mean_separation", "separation", "pressure", "area", "error", "stiffness")
+    setup = Setup(whole.surface, whole.bodies, whole.elastic_theory)
+    for one in names:
+        made = Contact(setup, {one: whole.quantity(one)})
+        for name in names:
+            if one in names[:2] or name == one:
+                assert made.quantity(name) == pytest.approx(whole.quantity(name), 1e-12)
+            else:
+                with pytest.raises(InputError, match=f"needs one of.*made with {one}"):
+                    made.quantity(name)
