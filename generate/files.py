@@ -15,11 +15,19 @@ from mbma_tables.data import FILE, boundary_elements
 
 ROOT = pathlib.Path(__file__).parents[1]
 DATA = ROOT / "docs" / "data"
-SOLVER = (
+SOLVER_SOURCES = (
     "mbma_tables/core/elementary.h",
     "mbma_tables/core/height_coefficients.h",
     "mbma_tables/core/heights.h",
     "mbma_tables/core/newton.c",
+)
+GEOMETRY_SOURCES = (
+    "mbma_tables/core/four.h",
+    "mbma_tables/core/island.h",
+    "mbma_tables/core/island4d.c",
+    "mbma_tables/core/quintic.h",
+)
+SOLVER = (
     "mbma_tables.theories.mbma.half_space",
     "mbma_tables.theories.mbma.greenwood_tripp",
 )
@@ -28,7 +36,10 @@ GEOMETRY = (
     "mbma_tables.theories.mbma.geometry",
     "mbma_tables.theories.mbma.island4d",
 )
-MODULES = {UNIVERSAL: SOLVER, ISLAND4D: SOLVER + GEOMETRY}
+MODULES = {
+    UNIVERSAL: SOLVER_SOURCES + SOLVER,
+    ISLAND4D: SOLVER_SOURCES + GEOMETRY_SOURCES + SOLVER + GEOMETRY,
+}
 
 
 def to_csv(head: str, frame: Any, form: str | None = None) -> bytes:

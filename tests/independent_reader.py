@@ -23,11 +23,11 @@ def height_integral(n, x):
 
 
 def weights(u):
-    """B-spline weights of the coefficients i ... i + 3."""
+    """B-spline weights of the coefficients i ... i + 5."""
     v = 1 - u
-    return np.array(
-        [v**3 / 6, 2 / 3 - u**2 * (1 - u / 2), 2 / 3 - v**2 * (1 - v / 2), u**3 / 6]
-    )
+    ends = [1 + 5 * t * (1 + t * (2 + t * (2 + t * (1 - t)))) for t in (v, u)]
+    middle = [66 - 60 * t**2 + 30 * t**4 - 10 * t**5 for t in (u, v)]
+    return np.array([v**5, ends[0], *middle, ends[1], u**5]) / 120
 
 
 def chebyshev(t):
@@ -116,7 +116,7 @@ class Reader:
             p = self.position(name, x)
             i = min(math.floor(p), self.variables[name].size - 2)
             # each step takes the first axis that is left
-            block = np.tensordot(weights(p - i), block[i : i + 4], axes=1)
+            block = np.tensordot(weights(p - i), block[i : i + 6], axes=1)
         return float(block)
 
     def answer(self, **arguments):

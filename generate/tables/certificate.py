@@ -41,11 +41,13 @@ def phi(X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> Floa
 class Kind:
     """A kind of table, computed by worker processes; the values are the same to the last bit."""
 
+    # of the target, the accuracy of the islands that the table is made of
+    solver_share = SOLVER_SHARE
+
     def __init__(self, configuration: Configuration, workers: int = 1) -> None:
         self.configuration, self.workers = configuration, workers
-        # accuracy of the islands that the table is made of: far below its target
         self.rtol = max(
-            SOLVER_SHARE * configuration.target, greenwood_tripp.MIN_SOLVER_RTOL
+            self.solver_share * configuration.target, greenwood_tripp.MIN_SOLVER_RTOL
         )
 
     def phi(

@@ -16,9 +16,9 @@ FUNCTIONS = ("F", "A")
 UNIVERSAL = "universal"
 ISLAND4D = "island4d"
 KINDS = (UNIVERSAL, ISLAND4D)
-FORMAT_VERSIONS = {UNIVERSAL: "2.0", ISLAND4D: "1.0"}
+FORMAT_VERSIONS = {UNIVERSAL: "2.0", ISLAND4D: "2.0"}
 COEFFICIENTS = {UNIVERSAL: "chebyshev", ISLAND4D: "spline"}
-DEGREE = 3  # degree of the splines of island4d
+DEGREE = 5  # degree of the splines of island4d
 AXES = {
     UNIVERSAL: (("X", "linear"), ("mu", "linear")),
     ISLAND4D: (
@@ -136,8 +136,7 @@ class TableContent:
     # universal table; else B-spline coefficients of log(Phi/Phi of the rigid sphere), each
     # axis longer by degree - 1, last axis F, A
     coefficients: FloatArray
-    # largest relative error in each cell (of a coarser grid: near it), times its factor; F,
-    # A
+    # bound on the relative error in each cell; F, A
     local_error: FloatArray
     # name -> (dimensions, values, attributes): edges of cells; log(Phi/Phi of the rigid
     # sphere) at nodes, coordinates
@@ -190,12 +189,6 @@ def dimensions(kind: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return tuple(f"{name}_knot" for name in names), tuple(
         f"{name}_cell" for name in names
     )
-
-
-def error_cell(axis: Axis, cells: int, position: Any) -> Any:
-    """Cell of the error field that contains a position."""
-    scaled = np.asarray(position) * (cells / (axis.nodes - 1))
-    return np.clip(np.floor(scaled).astype(np.intp), 0, cells - 1)
 
 
 # the first pattern that matches a name determines the type of the attribute
@@ -265,15 +258,21 @@ def _check_nodes(content: TableContent) -> None:
         or content.coefficients.shape[:-1] != knots
     ):
         raise ValueError("has values or coefficients that are not over its axes")
-    if len(cells) != len(nodes) or not all(
-        0 < count < most for count, most in zip(cells, nodes, strict=True)
-    ):
-        raise ValueError("has error bounds that are not over its axes")
+    if cells != tuple(count - 1 for count in nodes):
+        raise ValueError("has error bounds that are not over its cells")
     if (
         max(np.abs(array).max() for array in (*values, content.coefficients))
         > MAX_LOG_RATIO
     ):
         raise ValueError("has values that are not logarithms of ratios")
+    # readers may hold them in single precision
+    for name, array in (
+        ("coefficients", content.coefficients),
+        ("error bounds", content.local_error),
+    ):
+        rounded = array.astype(np.float32)
+        if not np.array_equal(rounded, array, equal_nan=True):
+            raise ValueError(f"has {name} that are not of single precision")
 
 
 def _check_cells(content: TableContent) -> None:

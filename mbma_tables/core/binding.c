@@ -387,6 +387,109 @@ static PyType_Spec LAW_TYPE = {
     LAW_SLOTS,
 };
 
+/* ---- tables as objects ---- */
+
+/* A table of islands that is checked once, in read-only arrays. */
+typedef struct {
+    PyObject_HEAD
+    Py_buffer views[ISLAND_TABLE_ARGUMENTS];
+    mbma_cells cells;          /* one of both */
+    mbma_island_table islands;
+    Py_ssize_t numbers;        /* of an island: 2, 4, or 0 before there is a table */
+} table_object;
+
+/* Takes the arrays by their kinds; false if that set an error. */
+static bool take_table(PyObject *arrays, Py_ssize_t count, const char *kind, argument *a,
+                       Py_buffer *views) {
+    size_t sizes[SIZE_LETTERS] = {UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN};
+    for (Py_ssize_t k = 0; k < count; k++) {
+        if (!take(PyTuple_GetItem(arrays, k), *kind++, &a[k], &views[k]))
+            return false;
+        const bool fits = has_size(&a[k], &kind, sizes);
+        kind += *kind == ' ';
+        if (!fits || !views[k].readonly) {
+            PyErr_Format(PyExc_ValueError, "core: arrays of a table must %s",
+                         fits ? "be read-only" : "match in size");
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Table(cells, places, numbers), or Table(coefficients, errors, cells, numbers, variant). */
+static int table_init(PyObject *self, PyObject *arrays, PyObject *names) {
+    table_object *const object = (table_object *)self;
+    const Py_ssize_t count = PyTuple_Size(arrays);
+    const bool by_two = count == TABLE_ARGUMENTS;
+    if (object->numbers || names || !(by_two || count == ISLAND_TABLE_ARGUMENTS)) {
+        PyErr_Format(PyExc_TypeError, "core: a table is made once, of %d or of %d arrays",
+                     (int)TABLE_ARGUMENTS, (int)ISLAND_TABLE_ARGUMENTS);
+        return -1;
+    }
+    argument a[ISLAND_TABLE_ARGUMENTS];
+    Py_buffer views[ISLAND_TABLE_ARGUMENTS];
+    memset(views, 0, sizeof views);
+    bool good = take_table(arrays, count, by_two ? TABLE : ISLAND_TABLE, a, views);
+    if (good && !(by_two ? is_table(a) : is_island_table(a))) {
+        PyErr_Format(PyExc_ValueError, "core: sizes of the arrays of a table, "
+                                       "or numbers of items in them, do not match");
+        good = false;
+    }
+    if (!good) {
+        for (Py_ssize_t k = 0; k < count; k++)
+            PyBuffer_Release(&views[k]); /* no effect without a buffer */
+        return -1;
+    }
+    memcpy(object->views, views, sizeof views);
+    if (by_two)
+        object->cells = cells_of(a);
+    else
+        object->islands = island_table_of(a);
+    object->numbers = by_two ? 2 : ISLAND_AXES;
+    return 0;
+}
+
+static void table_dealloc(PyObject *self) {
+    PyTypeObject *const type = Py_TYPE(self);
+    for (int k = 0; k < ISLAND_TABLE_ARGUMENTS; k++)
+        PyBuffer_Release(&((table_object *)self)->views[k]);
+    ((freefunc)PyType_GetSlot(type, Py_tp_free))(self);
+    Py_DECREF(type);
+}
+
+/* Force, area and the bound on their error of one island, or None for what is no float and outside
+ * the table, of which Python says what is wrong. */
+static PyObject *table_at(PyObject *self, PyObject *const *arguments, Py_ssize_t count) {
+    const table_object *const table = (const table_object *)self;
+    double x[ISLAND_AXES], out[3];
+    if (table->numbers == 0 || count != table->numbers)
+        return PyErr_Format(PyExc_TypeError, "core: an island is not %d numbers", (int)count);
+    for (Py_ssize_t k = 0; k < count; k++) {
+        if (!PyType_IsSubtype(Py_TYPE(arguments[k]), &PyFloat_Type))
+            return Py_BuildValue("");
+        x[k] = PyFloat_AsDouble(arguments[k]);
+    }
+    const bool bad = table->numbers == 2
+                         ? mbma_phi(1, &x[0], &x[1], &table->cells, out, NULL) != 0
+                         : mbma_island_lookup(&table->islands, x[0], x[1], x[2], x[3], out);
+    return bad ? Py_BuildValue("") : Py_BuildValue("(ddd)", out[0], out[1], out[2]);
+}
+
+static PyMethodDef TABLE_METHODS[] = {
+    {"at", (PyCFunction)(void (*)(void))table_at, METH_FASTCALL, NULL},
+    {NULL, NULL, 0, NULL},
+};
+static PyType_Slot TABLE_SLOTS[] = {
+    {Py_tp_dealloc, (void *)table_dealloc},
+    {Py_tp_init, (void *)table_init},
+    {Py_tp_methods, TABLE_METHODS},
+    {Py_tp_doc, (void *)"A table of islands, for one of them at a time."},
+    {0, NULL},
+};
+static PyType_Spec TABLE_TYPE = {
+    "mbma_tables.core.Table", sizeof(table_object), 0, Py_TPFLAGS_DEFAULT, TABLE_SLOTS,
+};
+
 /* ---- the processor ---- */
 
 #if defined(__x86_64__) || defined(_M_X64)
@@ -434,15 +537,18 @@ static int generation(void) { return 0; }
 
 static int execute(PyObject *module) {
     PyObject *const law = PyType_FromSpec(&LAW_TYPE);
+    PyObject *const table = PyType_FromSpec(&TABLE_TYPE);
 #if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
     const char *const arithmetic = "fma";
 #else
     const char *const arithmetic = "plain";
 #endif
     const bool good = PyModule_AddObjectRef(module, "Law", law) == 0 &&
+                      PyModule_AddObjectRef(module, "Table", table) == 0 &&
                       PyModule_AddStringConstant(module, "arithmetic", arithmetic) == 0 &&
                       PyModule_AddIntConstant(module, "generation", generation()) == 0;
     Py_XDECREF(law);
+    Py_XDECREF(table);
     return good ? 0 : -1;
 }
 

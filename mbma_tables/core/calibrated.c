@@ -7,17 +7,13 @@
 
 #include "elementary.h"
 #include "mbma.h"
+#include "quintic.h"
 
-enum { CHUNK = 128, COLUMNS = 8, MOST_STEPS = 100 };
+enum { CHUNK = 128, MOST_STEPS = 100 };
 
 #define LEAST 1e-300                /* smaller u count as zero */
 #define LEAST_LOG_SEPARATION -690.0 /* ln u at which full contact counts as reached */
 #define CLOSE 1e-9                  /* of ln F: the next error would be about the square of this one */
-
-/* 120 times the six cardinal quintic B-splines that reach a cell: rows by powers of the place in [0, 1] of it. */
-static const double QUINTIC[6][COLUMNS] = {{1.0, 26.0, 66.0, 26.0, 1.0},    {-5.0, -50.0, 0.0, 50.0, 5.0},
-                                           {10.0, 20.0, -60.0, 20.0, 10.0}, {-10.0, 20.0, 0.0, -20.0, 10.0},
-                                           {5.0, -20.0, 30.0, -20.0, 5.0},  {-1.0, 5.0, -10.0, 10.0, -5.0, 1.0}};
 
 static bool covers(const mbma_spline *s, double hurst, double log_zeta_1) {
     return s->low[0] <= hurst && hurst <= s->high[0] && s->low[1] <= log_zeta_1 && log_zeta_1 <= s->high[1];
@@ -25,17 +21,14 @@ static bool covers(const mbma_spline *s, double hurst, double log_zeta_1) {
 
 /* The cell of an axis, and the place z in [0, 1] of it; beyond the axis at its end, and NaN at the first. */
 MBMA_INLINE size_t cell_of(const mbma_spline *s, int axis, double x, double *z) {
-    const double at = mbma_held((x - s->first[axis]) * s->rate[axis], 0.0, (double)s->cells[axis]);
-    const int64_t cell = (int64_t)mbma_min(at, (double)s->cells[axis] - 1.0);
-    *z = at - (double)cell;
-    return (size_t)cell;
+    return quintic_cell((x - s->first[axis]) * s->rate[axis], s->cells[axis], z);
 }
 
 /* A surface's polynomials: made before, or sums over the first two axes by weights w from a corner on. */
 typedef struct {
     const double *pieces;
     const float *corner;
-    double w[2][COLUMNS];
+    double w[2][QUINTIC_COLUMNS];
 } own_spline;
 
 MBMA_INLINE own_spline own_of(const mbma_spline *s, const mbma_surfaces *surfaces, size_t k) {
@@ -48,10 +41,7 @@ MBMA_INLINE own_spline own_of(const mbma_spline *s, const mbma_surfaces *surface
     for (int axis = 0; axis < 2; axis++) {
         double z;
         own.corner += strides[axis] * cell_of(s, axis, axis == 0 ? surfaces->hurst[k] : surfaces->log_zeta_1[k], &z);
-        for (int m = 0; m < COLUMNS; m++) {
-            const double high = mbma_horner(QUINTIC[5][m], z, QUINTIC[4][m], QUINTIC[3][m], QUINTIC[2][m], QUINTIC[1][m]);
-            own.w[axis][m] = mbma_fma(high, z, QUINTIC[0][m]);
-        }
+        quintic_weights(z, own.w[axis]);
     }
     return own;
 }
@@ -60,19 +50,19 @@ MBMA_INLINE own_spline own_of(const mbma_spline *s, const mbma_surfaces *surface
 MBMA_INLINE void fill_powers(const mbma_spline *s, const own_spline *own, size_t cell, double p[6]) {
     const size_t row = s->cells[2] + 5, plane = (s->cells[1] + 5) * row;
     const float *at = own->corner + cell;
-    double sums[COLUMNS] = {0.0};
+    double sums[QUINTIC_COLUMNS] = {0.0};
     if (own->pieces) {
         memcpy(p, own->pieces + cell * 6, 6 * sizeof *p);
         return;
     }
     for (int m = 0; m < 6; m++, at += plane)
-        for (size_t k = 0; k < COLUMNS; k++) {
+        for (size_t k = 0; k < QUINTIC_COLUMNS; k++) {
             double sum = own->w[1][0] * (double)at[k];
             for (size_t j = 1; j < 6; j++)
                 sum = mbma_fma(own->w[1][j], (double)at[j * row + k], sum);
             sums[k] = mbma_fma(own->w[0][m], sum, sums[k]);
         }
-    const double part = 1.0 / (120.0 * 120.0 * 120.0), outer = sums[0] + sums[4], inner = sums[1] + sums[3];
+    const double part = 1.0 / (QUINTIC_UNIT * QUINTIC_UNIT * QUINTIC_UNIT), outer = sums[0] + sums[4], inner = sums[1] + sums[3];
     p[0] = mbma_fma(66.0, sums[2], mbma_fma(26.0, inner, outer)) * part;
     p[1] = mbma_fma(10.0, sums[3] - sums[1], sums[4] - sums[0]) * (5.0 * part);
     p[2] = mbma_fma(-6.0, sums[2], mbma_fma(2.0, inner, outer)) * (10.0 * part);

@@ -174,6 +174,84 @@ static bool do_island_geometry(const argument *a, long long *answer) {
     return true;
 }
 
+/* ---- island4d.c ---- */
+
+/* A table of islands by four numbers is five arguments. */
+enum { ISLAND_COEFFICIENTS, ISLAND_ERRORS, ISLAND_CELLS, ISLAND_NUMBERS, ISLAND_VARIANT };
+enum { ISLAND_TABLE_ARGUMENTS = ISLAND_VARIANT + 1, ISLAND_AXES = 4 };
+#define ISLAND_TABLE "F F L4 D17 D8 "
+
+/* The fourth of them, by axis. */
+typedef struct {
+    double first[ISLAND_AXES], rate[ISLAND_AXES], low[ISLAND_AXES], high[ISLAND_AXES], offset;
+} island_table_numbers;
+
+/* Cells of an axis, of which the product of four does not overflow. */
+enum { MOST_ISLAND_CELLS = 10000 };
+
+static bool is_island_table(const argument *table) {
+    const int64_t *const cells = table[ISLAND_CELLS].items;
+    /* along each axis 5 more than cells, of two functions */
+    size_t coefficients = 2, errors = 1;
+    for (int axis = 0; axis < ISLAND_AXES; axis++) {
+        if (cells[axis] < 1 || cells[axis] > MOST_ISLAND_CELLS)
+            return false;
+        coefficients *= (size_t)(cells[axis] + 5);
+        errors *= (size_t)cells[axis];
+    }
+    return table[ISLAND_COEFFICIENTS].count == coefficients && table[ISLAND_ERRORS].count == errors;
+}
+
+static mbma_island_table island_table_of(const argument *table) {
+    const int64_t *const cells = table[ISLAND_CELLS].items;
+    const island_table_numbers *const numbers = table[ISLAND_NUMBERS].items;
+    mbma_island_table found = {
+        .coefficients = table[ISLAND_COEFFICIENTS].items,
+        .errors = table[ISLAND_ERRORS].items,
+        .offset = numbers->offset,
+        .variant = variant_of(&table[ISLAND_VARIANT]),
+    };
+    for (int axis = 0; axis < ISLAND_AXES; axis++) {
+        found.cells[axis] = (size_t)cells[axis];
+        found.first[axis] = numbers->first[axis];
+        found.rate[axis] = numbers->rate[axis];
+        found.low[axis] = numbers->low[axis];
+        found.high[axis] = numbers->high[axis];
+    }
+    return found;
+}
+
+static bool do_island_bands(const argument *a, long long *answer) {
+    enum { SPREAD, SPHERE, HURST, VARIANT, MU, SIGMA, FORCE, AREA };
+    const mbma_variant variant = variant_of(&a[VARIANT]);
+    *answer = (long long)mbma_island_bands(a[SPREAD].count, a[SPREAD].items, a[SPHERE].items,
+                                           a[HURST].items, &variant, a[MU].items, a[SIGMA].items,
+                                           a[FORCE].items, a[AREA].items);
+    return true;
+}
+
+static bool do_island_places(const argument *a, long long *answer) {
+    enum { APPROACH, ZETA_D, ZETA_U, HURST, VARIANT, X, SPREAD, SPHERE, MU, SIGMA, FORCE, AREA };
+    const mbma_variant variant = variant_of(&a[VARIANT]);
+    *answer = (long long)mbma_island_places(a[APPROACH].count, a[APPROACH].items, a[ZETA_D].items,
+                                            a[ZETA_U].items, a[HURST].items, &variant, a[X].items,
+                                            a[SPREAD].items, a[SPHERE].items, a[MU].items,
+                                            a[SIGMA].items, a[FORCE].items, a[AREA].items);
+    return true;
+}
+
+static bool do_island_answers(const argument *a, long long *answer) {
+    enum { X, SPREAD, SPHERE, HURST, MU, TABLE_AT };
+    enum { PHI_F = TABLE_AT + ISLAND_TABLE_ARGUMENTS, PHI_A, ERROR };
+    if (!is_island_table(&a[TABLE_AT]))
+        return false;
+    const mbma_island_table table = island_table_of(&a[TABLE_AT]);
+    *answer = (long long)mbma_island_answers(a[X].count, a[X].items, a[SPREAD].items,
+                                             a[SPHERE].items, a[HURST].items, a[MU].items, &table,
+                                             a[PHI_F].items, a[PHI_A].items, a[ERROR].items);
+    return true;
+}
+
 /* ---- profile.c ---- */
 
 enum { PANEL_RULES = 3, PANEL_PLACES = MBMA_PANEL_NODES + MBMA_PANEL_CHECKS };
@@ -629,6 +707,9 @@ static bool do_spectrum_law_separation(const argument *a, long long *answer) {
     FN(phi, "Dn Dn " TABLE "w3n b?n") \
     FN(totals, "Dn Dn Dn Dn d D8 " TABLE "w4n wn bn l1") \
     FN(island_geometry, "d d d D8 w") \
+    FN(island_bands, "Dn Dn Dn D8 wn wn wn wn") \
+    FN(island_places, "Dn Dn Dn Dn D8 wn wn wn wn wn wn wn") \
+    FN(island_answers, "Dn Dn Dn Dn Dn " ISLAND_TABLE "wn wn wn") \
     FN(profile_islands, "Dn d d d D8 " TABLE "w4n w1") \
     FN(profile_missed, PANELS "d wn") \
     FN(profile_series, PANELS "w wn w wm wm l") \

@@ -65,4 +65,11 @@ static double whole(int n, double x) {
     return !(x < 0.0) ? value : n == 1 ? value - x : 1.0 + x * x - value;
 }
 
+/* Phi_F and Phi_A of a sphere that does not deform, the limit of both as mu goes to 0: (mu/2) pi F_{5/2}(-X)/(5/2) and
+ * pi F_2(-X)/2. */
+MBMA_INLINE void rigid_sphere(double X, double mu, double phi[2]) {
+    phi[0] = mu * (MBMA_PI / 5.0 * halves_of(-X).five_halves);
+    phi[1] = MBMA_PI / 2.0 * whole(2, -X);
+}
+
 #endif

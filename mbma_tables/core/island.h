@@ -30,6 +30,19 @@ typedef struct {
     double offset;               /* 1, or 0 without h_d */
 } surface;
 
+/* How far the roughness of a band is from a smooth sphere, mu (32), and force and area of the island per Phi_F (40) and per
+ * Phi_A and eta, of its summits' density and standard deviation and of the radii of sphere and summits. */
+typedef struct {
+    double mu, force, area;
+} scales;
+
+MBMA_INLINE scales scales_of(double D, double sigma, double R_d, double R_u) {
+    const double both = R_u * R_d;
+    const scales found = {8.0 / 3.0 * D * sigma * sqrt(2.0 * both), sigma * sqrt(2.0 * R_d * sigma),
+                          2.0 * MBMA_PI * D * both * sigma * sigma};
+    return found;
+}
+
 /* An island; force and area are those per Phi_F and Phi_A. */
 typedef struct {
     double X, mu, force, area, h_d, D_d, sigma_d;
@@ -107,11 +120,11 @@ MBMA_INLINE island island_at(double x, bool floor_d, bool floor_u, const surface
     n.narrowness = 1.0 / n.sigma_d;
     n.count = n.D_d * n.narrowness * (s->rms_over_s / ROOT_TWO_PI);
     n.h_d = s->offset * root_a;
-    const double both = n.R_u * n.R_d;
-    n.force = n.sigma * sqrt(2.0 * n.R_d * n.sigma);                     /* (40) per Phi_F */
-    n.mu = 8.0 / 3.0 * n.D * n.sigma * sqrt(2.0 * both);                 /* (32) */
+    const scales scale = scales_of(n.D, n.sigma, n.R_d, n.R_u);
+    n.mu = scale.mu;
+    n.force = scale.force;
     n.eta = s->eta_factor * mbma_exp(mbma_log(root_b / n.R_u) * (1.0 / 3.0)); /* (39) */
-    n.area = 2.0 * MBMA_PI * n.eta * n.D * both * n.sigma * n.sigma;
+    n.area = scale.area * n.eta;
     n.X = (s->rms_over_s * x - n.h_d) / n.sigma;
     return n;
 }

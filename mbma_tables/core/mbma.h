@@ -73,6 +73,44 @@ size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const do
                    double rtol, const mbma_variant *variant, const mbma_cells *cells, double *out, double *error,
                    uint8_t *status, int64_t *islands);
 
+/* ---- island4d.c: islands by the paper's four numbers -------------------------------------------------------------- */
+
+#define MBMA_SPHERE_FLOOR 1.25 /* zeta_d at the end of the axis `sphere`, below the paper's floor of 1.5 */
+
+/* ln(Phi/Phi of a rigid sphere) as quintic B-splines on equally spaced nodes over ln(X + offset), ln(spread), sphere and
+ * H, `coefficients` of F and A side by side, along each axis 5 more than cells; and for each cell a bound on the relative
+ * error. Here X = (delta - h_d)/sigma is how deep an island is, spread = zeta_u/zeta_d - 1 and sphere =
+ * (MBMA_SPHERE_FLOOR/zeta_d)^(4 - 2H). */
+typedef struct {
+    const float *coefficients, *errors;
+    size_t cells[4];
+    double first[4], rate[4]; /* first node and nodes in 1, of the numbers above */
+    double low[4], high[4];   /* of X, spread, sphere and H, between which islands are answered */
+    double offset;            /* of X */
+    mbma_variant variant;     /* for which the table was made */
+} mbma_island_table;
+
+/* Of bands of roughness: mu (32), sigma zeta_d^H, and force and area per Phi_F and Phi_A (40), times zeta_d^(1 + H) and
+ * zeta_d^2, in units of E* s/q0 and eta/q0^2. */
+size_t mbma_island_bands(size_t n, const double *spread, const double *sphere, const double *hurst,
+                         const mbma_variant *variant, double *mu, double *sigma, double *force, double *area);
+
+/* Places of islands on the table's axes, mu, sigma zeta_d^H, and force and area per Phi_F and Phi_A. `approach` is delta/h_rms read at
+ * zeta_1 without bound; 1 < zeta_d < zeta_u. */
+size_t mbma_island_places(size_t n, const double *approach, const double *zeta_d, const double *zeta_u,
+                          const double *hurst, const mbma_variant *variant, double *X, double *spread, double *sphere,
+                          double *mu, double *sigma, double *force, double *area);
+
+/* Phi_F, Phi_A and the bound on their relative error at places of the axes. Spreads below the first are answered to
+ * first order in mu. */
+size_t mbma_island_answers(size_t n, const double *X, const double *spread, const double *sphere, const double *hurst,
+                           const double *mu, const mbma_island_table *table, double *phi_F, double *phi_A,
+                           double *error);
+
+/* F_hat = F^i q0/(E* s), A_hat = A^i q0^2/eta and the bound on their relative error, of one island. */
+mbma_status mbma_island_lookup(const mbma_island_table *table, double approach, double zeta_d, double zeta_u,
+                               double hurst, double out[3]);
+
 /* ---- profile.c: one surface at many gaps ------------------------------------------------------------------------ */
 
 enum { MBMA_PANEL_NODES = 16, MBMA_PANEL_CHECKS = 3, MBMA_PANEL_GAPS = 10, MBMA_PANEL_ROWS = 4 };

@@ -287,9 +287,7 @@ static mbma_status solve(island_problem *island, double rtol, const mbma_basis *
     island->a_squared = area_0 > TINY ? extent_squared(X, mu, EXTENT_SHARE * rtol) : 1.0;
     memset(island->w, 0, n * sizeof *island->w);
     if (mu * deepest.half * (1.0 + island->a_squared) < NEGLIGIBLE) {
-        /* the rigid sphere, the limit as mu goes to 0 */
-        phi[0] = mu * (MBMA_PI / 5.0 * deepest.five_halves);
-        phi[1] = MBMA_PI / 2.0 * area_0;
+        rigid_sphere(X, mu, phi);
         phi[2] = area_0 > 0.0 ? ROUNDING : 0.0;
         fill_profile(island, b);
         return MBMA_OK;

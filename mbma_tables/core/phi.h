@@ -2,32 +2,10 @@
 #ifndef MBMA_PHI_H
 #define MBMA_PHI_H
 
-#include "elementary.h"
+#include "four.h"
 #include "mbma.h"
 
 #define BUCKET_BITS 49 /* 3 bits of the mantissa of mu: 8 buckets an octave */
-
-/* Four doubles at once: fma4(a, y, b) is a y + b, which compilers do not vectorise by themselves here. */
-#if defined(__FMA__)
-#include <immintrin.h>
-typedef __m256d four;
-MBMA_INLINE four four_of(const double *row) { return _mm256_loadu_pd(row); }
-MBMA_INLINE four fma4(four a, double y, four b) { return _mm256_fmadd_pd(a, _mm256_set1_pd(y), b); }
-#else
-typedef struct {
-    double lane[4];
-} four;
-MBMA_INLINE four four_of(const double *row) {
-    four found;
-    memcpy(&found, row, sizeof found);
-    return found;
-}
-MBMA_INLINE four fma4(four a, double y, four b) {
-    for (int i = 0; i < 4; i++)
-        b.lane[i] = mbma_fma(a.lane[i], y, b.lane[i]);
-    return b;
-}
-#endif
 
 /* The polynomial of a cell at x and y; the sum over powers of x by halves. */
 MBMA_INLINE double polynomial(const double c[8][8], double x, double y) {

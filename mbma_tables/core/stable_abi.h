@@ -39,7 +39,7 @@ typedef struct { const char *name; int basicsize, itemsize; unsigned flags; PyTy
 #define PyObject_HEAD PyObject ob_base;
 #define PyModuleDef_HEAD_INIT {{1, NULL}, NULL, 0, NULL}
 enum { METH_KEYWORDS = 2, METH_NOARGS = 4, METH_FASTCALL = 0x80, Py_mod_exec = 2 };
-enum { Py_tp_dealloc = 52, Py_tp_doc = 56, Py_tp_methods = 64, Py_tp_free = 74 };
+enum { Py_tp_dealloc = 52, Py_tp_doc = 56, Py_tp_init = 60, Py_tp_methods = 64, Py_tp_free = 74 };
 enum { Py_TPFLAGS_DEFAULT = 0, Py_TPFLAGS_BASETYPE = 1 << 10 };
 enum { PyBUF_WRITABLE = 1, PyBUF_FORMAT = 4, PyBUF_C_CONTIGUOUS = 0x38 };
 #define Py_None (&_Py_NoneStruct)
@@ -78,7 +78,7 @@ PyAPI_FUNC(PyObject *) PyObject_CallMethod(PyObject *, const char *, const char 
 PyAPI_FUNC(PyObject *) PyObject_GetAttrString(PyObject *, const char *);
 PyAPI_FUNC(int) PyObject_GetBuffer(PyObject *, Py_buffer *, int); PyAPI_FUNC(Py_ssize_t) PyObject_Size(PyObject *);
 PyAPI_FUNC(PyObject *) PyTuple_GetItem(PyObject *, Py_ssize_t); PyAPI_FUNC(Py_ssize_t) PyTuple_Size(PyObject *);
-PyAPI_FUNC(PyObject *) PyType_FromSpec(PyType_Spec *); PyAPI_FUNC(void *) PyType_GetSlot(PyTypeObject *, int);
+PyAPI_FUNC(PyObject *) PyType_FromSpec(PyType_Spec *); PyAPI_FUNC(int) PyType_IsSubtype(PyTypeObject *, PyTypeObject *); PyAPI_FUNC(void *) PyType_GetSlot(PyTypeObject *, int);
 PyAPI_FUNC(int) PyUnicode_CompareWithASCIIString(PyObject *, const char *);
 
 #endif

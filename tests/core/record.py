@@ -12,6 +12,8 @@ import numpy as np
 from mbma_tables import Bodies
 from mbma_tables import core as package
 from mbma_tables.theories import Mbma
+from mbma_tables.theories.mbma.island4d import band_fields
+from mbma_tables.theories.mbma.variants import REPORTED
 
 MOST_CALLS = 12  # of each function
 MOST_BYTES = 5_000_000  # of an array
@@ -101,6 +103,9 @@ def use():
     X = np.linspace(-5, 40, 300)
     mu = np.geomspace(1e-6, 1e5, 300)
     universal.answer(X, mu)
+    four = np.linspace(1.0, 3.0, 300), 3.0, np.linspace(3.1, 400.0, 300), 0.8
+    open_table("island4d").lookup(*four)
+    band_fields(np.geomspace(1e-9, 1e3, 300), np.linspace(0, 1, 300), 0.7, REPORTED)
     greenwood_tripp.rigid_sphere(X, mu)
     greenwood_tripp.solve(X[50:250:10], mu[50:250:10]).pressure.sum()
     one = Surface(0.7, 0.2, 60.0, 1.0, 3.0)

@@ -124,6 +124,42 @@ def test_a_law_is_asked_only_of_a_block_that_nothing_changes():
     assert restored.pressure(1.0) == law.pressure(1.0)
 
 
+def test_a_table_as_an_object_is_made_once_of_arrays_that_nothing_changes():
+    model = open_table("island4d")
+    for arrays, island in (
+        (open_table("universal").cells, (2.0, 1e-3)),
+        (model._core_table, (1.0, 3.0, 20.0, 0.8)),
+    ):
+        table = core.Table(*arrays)
+        assert len(table.at(*island)) == 3
+        assert table.at(*island[:-1], np.nan) is None
+        assert table.at(*island[:-1], "0.8") is None
+        with pytest.raises(TypeError, match="an island is not 3 numbers"):
+            table.at(1.0, 2.0, 3.0)
+        with pytest.raises(TypeError, match="made once"):
+            table.__init__(*arrays)
+        with pytest.raises(TypeError, match="of 3 or of 5 arrays"):
+            core.Table(*arrays[:2])
+        for k, array in enumerate(arrays):
+            changed = [*arrays]
+            changed[k] = array.copy()
+            with pytest.raises(ValueError, match="read-only"):
+                core.Table(*changed)
+            changed[k] = array[:1]
+            with pytest.raises(ValueError, match="match"):
+                core.Table(*changed)
+            changed[k] = None
+            with pytest.raises(ValueError, match="match|read-only"):
+                core.Table(*changed)
+    wrong = model._core_table[2].copy()
+    wrong[1] = -5
+    wrong.flags.writeable = False
+    with pytest.raises(ValueError, match="or numbers of items in them"):
+        core.Table(*model._core_table[:2], wrong, *model._core_table[3:])
+    with pytest.raises(TypeError, match="an island is not 2 numbers"):
+        core.Table.__new__(core.Table).at(1.0, 2.0)
+
+
 def test_other_threads_go_on_during_a_call():
     x = np.full(3_000_000, 0.5)
     worker = threading.Thread(target=lambda: core.elementary(3, x, np.empty(x.size)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,25 +10,21 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import (
     FloatArray,
+    answered,
     broadcast_shape,
+    filled,
     finite_array,
     require,
 )
 from mbma_tables.common.errors import OutOfRangeError
-from mbma_tables.common.interrupts import in_blocks
-from mbma_tables.common.table_schema import TableContent, error_cell
-from mbma_tables.surfaces.spectrum import BROADENING, RADIUS
-from mbma_tables.theories.mbma import greenwood_tripp
+from mbma_tables.common.shared import shared_property
+from mbma_tables.common.table_schema import Axis, TableContent
+from mbma_tables.core import core
 from mbma_tables.theories.mbma.island_models import SOLVER, IslandAnswer, check_outside
 from mbma_tables.theories.mbma.variants import Variant, get_variant
 
-MOST_WIDTH = (
-    700.0  # largest (4 - 2H) ln(zeta_u/zeta_d), so that its exponential is finite
-)
-SPHERE_FLOOR = (
-    1.25  # zeta_d at the end of the axis `sphere`, below the paper's floor of 1.5
-)
-BLOCK = 1 << 15  # islands between two checks for Ctrl-C
+# zeta_d at the end of the axis `sphere`, below the paper's floor of 1.5; as in mbma.h
+SPHERE_FLOOR = 1.25
 
 
 def band_fields(
@@ -36,38 +32,10 @@ def band_fields(
 ) -> FloatArray:
     """(mu, sigma zeta_d^H, F_hat zeta_d^(1+H) per Phi_F, A_hat zeta_d^2 per Phi_A), stacked first.
 
-    Arrays of one shape. All are finite for every zeta_d, because its powers cancel; NaN
-    unless zeta_u > zeta_d.
+    All are finite for every zeta_d, because its powers cancel; NaN unless zeta_u > zeta_d.
     """
-    from scipy.special import exprel
-
-    with np.errstate(all="ignore"):
-        power = 4 - 2 * hurst
-        width = np.log1p(spread)
-        # zeta_d^(-p), and integrals of r^(order - 2H - 1) over the band and its width
-        inverse = sphere * SPHERE_FLOOR**-power
-        growth = [exprel((k - 2 * hurst) * width) for k in (0, 2, 4)]
-        D = 0.75 * (growth[2] / growth[1]) / variant.density_divisor
-        # alpha = 1.5 g0 g4/g2^2, Eq. (3), grouped so that nothing overflows
-        narrowness = growth[1] / growth[0] * (growth[1] / growth[2])
-        share = 1 - (BROADENING / 1.5 * narrowness if variant.summit_sigma else 0.0)
-        sigma = np.sqrt(share * (2 * hurst * width * growth[0]))
-        scale = 0.75 * hurst / power
-        top = np.exp(power * width)
-        R_d, R_u = (RADIUS / np.sqrt(scale * (end - inverse)) for end in (1.0, top))
-        mu = 8 / 3 * D * sigma * np.sqrt(2 * R_u * R_d)
-        found = np.array(
-            [
-                mu,
-                sigma,
-                sigma * np.sqrt(2 * R_d * sigma),
-                2 * np.pi * D * R_u * R_d * sigma**2,
-            ]
-        )
-        good = (
-            (spread > 0) & (sphere >= 0) & (np.abs(power * width) < MOST_WIDTH) & (mu > 0)
-        )
-    return np.where(good, found, np.nan)
+    given = spread, sphere, hurst
+    return np.array(answered(core.island_bands, given, 4, variant.numbers))
 
 
 class Coordinates(NamedTuple):
@@ -90,23 +58,32 @@ def to_axes(
     hurst: FloatArray,
     variant: Variant,
 ) -> Coordinates:
-    """Table coordinates of the paper's four numbers, flat arrays with zeta_u > zeta_d."""
-    spread = (zeta_u - zeta_d) / zeta_d
-    sphere = (SPHERE_FLOOR / zeta_d) ** (4 - 2 * hurst)
-    mu, sigma, force, area = band_fields(spread, sphere, hurst, variant)
-    wide = zeta_d**hurst
-    X = (delta_over_h_rms * wide - 1) / sigma
-    return Coordinates(
-        X, spread, sphere, hurst, mu, sigma, force / (zeta_d * wide), area / zeta_d**2
+    """Table coordinates of the paper's four numbers; NaN unless zeta_u > zeta_d."""
+    given = delta_over_h_rms, zeta_d, zeta_u, hurst
+    X, spread, sphere, *others = answered(core.island_places, given, 7, variant.numbers)
+    return Coordinates(X, spread, sphere, np.broadcast_to(hurst, X.shape), *others)
+
+
+def core_table(
+    axes: Sequence[Axis],
+    coefficients: FloatArray,
+    local_error: FloatArray,
+    variant: Variant,
+) -> tuple[Any, ...]:
+    """A table in the core's format, `mbma_island_table` of mbma.h: coefficients, errors, cells, numbers and variant."""
+    numbers = [
+        [axis.start for axis in axes],
+        [1 / axis.step for axis in axes],
+        [axis.low for axis in axes],
+        [axis.high for axis in axes],
+    ]
+    return (
+        np.ascontiguousarray(coefficients, np.float32).ravel(),
+        np.ascontiguousarray(local_error.max(axis=-1), np.float32).ravel(),
+        np.array([axis.nodes - 1 for axis in axes], np.int64),
+        np.append(np.ravel(numbers), axes[0].offset),
+        variant.numbers,
     )
-
-
-def spline_of(coefficients: FloatArray) -> Any:
-    """Cubic functions of four axes, of positions in units of nodes, (entries, 4); NaN beyond the axes."""
-    from scipy.interpolate import NdBSpline
-
-    knots = tuple(np.arange(count + 4) - 3.0 for count in coefficients.shape[:4])
-    return NdBSpline(knots, coefficients, 3, extrapolate=False)
 
 
 class Lookup(NamedTuple):
@@ -139,8 +116,19 @@ class Island4dModel:
         self.content = content
         self.variant = get_variant(content.attributes["variant"])
         self._X, self._spread, _, self._hurst = content.axes
-        self._spline = spline_of(content.coefficients)
-        self._error: FloatArray = content.local_error.max(axis=-1)
+
+    def __reduce__(self) -> tuple[type[Island4dModel], tuple[TableContent]]:
+        return type(self), (self.content,)
+
+    @shared_property
+    def _core_table(self) -> tuple[Any, ...]:
+        own = self.content
+        return core_table(own.axes, own.coefficients, own.local_error, self.variant)
+
+    @shared_property
+    def _one(self) -> Any:
+        """Of one island of four floats its lookup, None outside the table and for other types."""
+        return core.Table(*self._core_table).at
 
     def __repr__(self) -> str:
         return f"Island4dModel({self.content.describe()})"
@@ -167,6 +155,10 @@ class Island4dModel:
             For islands that the table does not cover: an error, the exact solver, or NaN.
         """
         check_outside(outside)
+        one = self._one(delta_over_h_rms, zeta_d, zeta_u, hurst)
+        if one is not None:
+            F_hat, A_hat, error = one
+            return Lookup(np.float64(F_hat), np.float64(A_hat), np.float64(error))
         named = {
             "delta_over_h_rms": delta_over_h_rms,
             "zeta_d": zeta_d,
@@ -227,17 +219,12 @@ class Island4dModel:
 
         Below the table's spread log(Phi/Phi_rigid) is proportional to mu.
         """
-        axes = self.content.axes
-        low = self._spread.low
-        held = place.X, np.maximum(place.spread, low), place.sphere, place.hurst
-        inside = np.all(
-            [
-                (x >= axis.low) & (x <= axis.high)
-                for axis, x in zip(axes, held, strict=True)
-            ],
-            axis=0,
-        )
-        if outside == "raise" and not inside.all():
+        given = *place[:4], place.mu
+        out = filled(core.island_answers, given, 3, *self._core_table)
+        missing = np.isnan(out[2])
+        if not missing.any():
+            return out
+        if outside == "raise":
             spread = place.spread.reshape(shape)
             X = place.X.reshape(shape)
             require(
@@ -253,32 +240,8 @@ class Island4dModel:
                 f"in [{self._X.low:g}, {self._X.high:g}]",
             )
             raise OutOfRangeError(
-                "islands outside the table's axes", ~inside.reshape(shape)
+                "islands outside the table's axes", missing.reshape(shape)
             )
-        out = np.full((3, inside.size), np.nan)
-        if inside.any():
-            X, spread, sphere, hurst = given = [x[inside] for x in held]
-            # an end may be missed by rounding
-            places = np.stack(
-                [
-                    np.clip(axis.position(x), 0, axis.nodes - 1)
-                    for axis, x in zip(axes, given, strict=True)
-                ]
-            )
-            cells = [
-                error_cell(*every)
-                for every in zip(axes, self._error.shape, places, strict=True)
-            ]
-            blocks = in_blocks(
-                lambda block: self._spline(places[:, block].T).T, X.size, BLOCK
-            )
-            mu = place.mu[inside]
-            edge = band_fields(spread, sphere, hurst, self.variant)[0]
-            log_ratio = np.concatenate(blocks, axis=1) * np.where(
-                place.spread[inside] < low, mu / edge, 1.0
-            )
-            out[:2, inside] = greenwood_tripp.rigid_sphere(X, mu) * np.exp(log_ratio)
-            out[2, inside] = self._error[tuple(cells)]
         if outside == "exact":
-            out[:, ~inside] = SOLVER.answer(place.X[~inside], place.mu[~inside])
+            out[:, missing] = SOLVER.answer(place.X[missing], place.mu[missing])
         return out

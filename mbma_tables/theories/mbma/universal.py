@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -19,7 +20,12 @@ from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.shared import shared_property
 from mbma_tables.common.table_schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
 from mbma_tables.core import core
-from mbma_tables.theories.mbma.island_models import SOLVER, IslandAnswer, check_outside
+from mbma_tables.theories.mbma.island_models import (
+    OUTSIDE,
+    SOLVER,
+    IslandAnswer,
+    check_outside,
+)
 
 BLOCK = 1 << 16  # islands between two checks for Ctrl-C
 TERMS = 8  # terms of each polynomial along each axis
@@ -99,6 +105,23 @@ class UniversalModel(Ranged):
         self.content = content
         self._X, self._mu = content.axes
         self.ranges = {"X": (self._X.low, self._X.high), "mu": (0.0, self._mu.high)}
+
+    def __reduce__(self) -> tuple[type[UniversalModel], tuple[TableContent]]:
+        return type(self), (self.content,)
+
+    @shared_property
+    def _one(self) -> Any:
+        """Of one island of two floats its answer, None outside the table and for other types."""
+        return core.Table(*self.cells).at
+
+    def answer(
+        self, X: ArrayLike, mu: ArrayLike, *, outside: str = "raise"
+    ) -> IslandAnswer:
+        one = self._one(X, mu)
+        if one is None or outside not in OUTSIDE:
+            return super().answer(X, mu, outside=outside)
+        phi_F, phi_A, error = one
+        return IslandAnswer(np.float64(phi_F), np.float64(phi_A), np.float64(error))
 
     def __repr__(self) -> str:
         return f"UniversalModel({self.content.describe()})"

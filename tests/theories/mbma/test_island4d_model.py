@@ -1,5 +1,8 @@
 """`Island4dModel` against islands by geometry and solver, at every edge and beyond its axes."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from small_tables import small_table
@@ -8,7 +11,12 @@ from mbma_tables import InputError, OutOfRangeError, greenwood_tripp
 from mbma_tables.common.table_schema import ISLAND4D
 from mbma_tables.theories.mbma.geometry import geometry
 from mbma_tables.theories.mbma.island import scale_area, scale_force
-from mbma_tables.theories.mbma.island4d import SPHERE_FLOOR, Island4dModel, to_axes
+from mbma_tables.theories.mbma.island4d import (
+    SPHERE_FLOOR,
+    Island4dModel,
+    band_fields,
+    to_axes,
+)
 from mbma_tables.theories.mbma.tables import open_table
 from mbma_tables.theories.mbma.variants import REPORTED
 
@@ -135,3 +143,78 @@ def test_narrow_bands(power):
         (found.A_hat, place.area, solved.phi_A),
     ):
         np.testing.assert_allclose(hat, scale * phi, rtol=found.error.max() + 1e-10)
+
+
+def test_bounds_hold_and_are_close_to_the_errors():
+    """Against the table `universal`, which is five orders more accurate, below the first spread too."""
+    table = open_table("island4d")
+    X, spread, sphere, hurst = random_places(table, 40_000)
+    spread[::20] = table.content.axes[1].low * np.geomspace(1e-6, 1, spread[::20].size)
+    mu = band_fields(spread, sphere, hurst, table.variant)[0]
+    zeta_d = SPHERE_FLOOR * sphere ** (-1 / (4 - 2 * hurst))
+    width = np.log1p(spread)
+    fields = {"X": X, "width": width, "zeta_d": zeta_d, "hurst": hurst, "mu": mu}
+    found = table.of_islands(fields)
+    exact = open_table("universal").answer(X, mu)
+    pairs = zip(found[:2], exact[:2], strict=True)
+    errors = np.max([np.abs(own / other - 1) for own, other in pairs], axis=0)
+    assert (errors <= found.error + exact.error).all()
+    assert errors.max() < 2e-5
+    assert np.median(found.error / errors) < 5
+
+
+def random_places(table, count):
+    """Coordinates of the axes of a table, evenly over its box."""
+    rng = np.random.default_rng(7)
+    nodes = [axis.nodes - 1 for axis in table.content.axes]
+    return [
+        axis.coordinate(rng.uniform(0, last, count))
+        for axis, last in zip(table.content.axes, nodes, strict=True)
+    ]
+
+
+ONE = {"island4d": (1.0, 3.0, 20.0, 0.8), "universal": (2.0, 1e-3)}
+
+
+@pytest.mark.parametrize("kind", ONE)
+def test_one_island_is_answered_as_in_an_array(kind):
+    """Floats are answered without numpy, other numbers with it, by the same arithmetic."""
+    table = open_table(kind)
+    lookup = table.lookup if kind == "island4d" else table.answer
+    one = ONE[kind]
+    many = lookup(*(np.full(3, value) for value in one))
+    for given in (one, [np.float64(value) for value in one], [[value] for value in one]):
+        found = lookup(*given)
+        assert type(found) is type(many)
+        for alone, row in zip(found, many, strict=True):
+            assert np.ravel(alone)[0] == row[0] == row[2]
+            assert np.shape(alone) == np.shape(given[0])
+    assert {type(field) for field in lookup(*one)} == {np.float64}
+    for outside in ("raise", "exact", "nan"):
+        assert lookup(*one, outside=outside) == lookup(*one)
+    with pytest.raises(InputError, match="outside must be one of"):
+        lookup(*one, outside="clamp")
+
+
+@pytest.mark.parametrize("kind", ONE)
+@pytest.mark.parametrize(
+    "wrong", [np.nan, np.inf, -np.inf, "3", None, True, 1j, [], 1e300]
+)
+def test_one_wrong_number_is_refused(kind, wrong):
+    table = open_table(kind)
+    lookup = table.lookup if kind == "island4d" else table.answer
+    for place in range(len(ONE[kind])):
+        given = list(ONE[kind])
+        given[place] = wrong
+        with pytest.raises((InputError, OutOfRangeError)):
+            lookup(*given)
+
+
+@pytest.mark.parametrize("kind", ONE)
+def test_a_table_that_was_used_is_pickled(kind):
+    table = open_table(kind)
+    for used in (table, copy.deepcopy(table), pickle.loads(pickle.dumps(table))):
+        lookup = used.lookup if kind == "island4d" else used.answer
+        assert lookup(*ONE[kind]) == (
+            table.lookup if kind == "island4d" else table.answer
+        )(*ONE[kind])

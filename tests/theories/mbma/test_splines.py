@@ -9,11 +9,14 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
 
 from generate.splines import coefficients, padding
-from generate.tables.island4d import error_cells
-from mbma_tables.common.table_schema import Axis, error_cell
-from mbma_tables.theories.mbma.island4d import spline_of
+from mbma_tables.common.arguments import filled
+from mbma_tables.common.table_schema import Axis
+from mbma_tables.core import core
+from mbma_tables.theories.mbma import greenwood_tripp
+from mbma_tables.theories.mbma.island4d import core_table
+from mbma_tables.theories.mbma.variants import REPORTED
 
-SHAPE = (8, 7, 6, 5)
+SHAPE = (9, 8, 7, 6)
 
 
 def node_values(shape, seed=1):
@@ -21,17 +24,6 @@ def node_values(shape, seed=1):
     grid = np.meshgrid(*(np.linspace(0, 2, n) for n in shape), indexing="ij")
     smooth = np.stack([np.sin(sum(grid)), np.exp(-grid[0] * grid[1])], axis=-1)
     return smooth + 0.3 * rng.standard_normal((*shape, 2))
-
-
-def by_scipy(values, degree, axes):
-    knots = []
-    for axis in range(axes):
-        one = make_interp_spline(
-            np.arange(values.shape[axis]), values, k=degree, axis=axis
-        )
-        knots.append(one.t)
-        values = np.moveaxis(one.c, 0, axis) if one.c.shape != values.shape else one.c
-    return NdBSpline(tuple(knots), values, degree)
 
 
 def random_positions(shape, count, seed=2):
@@ -47,19 +39,31 @@ def random_positions(shape, count, seed=2):
     ]
 
 
-def test_tensor_splines_are_those_of_scipy():
-    values = node_values(SHAPE)
-    coefs = coefficients(values, 3, 4)
-    spline = by_scipy(values, 3, 4)
-    assert coefs.shape == (*(n + 2 for n in SHAPE), 2)
+def test_the_core_evaluates_tensor_splines_as_scipy():
+    """At random places and on nodes, edges and corners; Phi over that of a rigid sphere is the exponential."""
+    values = 0.3 * node_values(SHAPE)
+    coefs = coefficients(values, 5, 4).astype(np.float32).astype(float)
+    assert coefs.shape == (*(n + 4 for n in SHAPE), 2)
+    knots = tuple(np.arange(n + 10) - 5.0 for n in SHAPE)
     positions = random_positions(SHAPE, 500)
-    points = np.stack(positions, axis=-1)
-    np.testing.assert_allclose(
-        spline_of(coefs)(points),
-        spline(points),
-        rtol=1e-11,
-        atol=1e-11 * np.abs(values).max(),
-    )
+    expected = NdBSpline(knots, coefs, 5)(np.stack(positions, axis=-1))
+    ranges = ("log", 3.0, 0.5, 26.0), ("log", 0.0, 1e-8, 2500.0), (0.0, 1.0), (0.3, 1.0)
+    axes = [
+        Axis("x", "", *(("linear", 0.0, *ends) if len(ends) == 2 else ends), nodes)
+        for ends, nodes in zip(ranges, SHAPE, strict=True)
+    ]
+    cells = tuple(n - 1 for n in SHAPE)
+    bounds = np.arange(math.prod(cells), dtype=float).reshape(cells)
+    table = core_table(axes, coefs, np.stack([bounds, 0 * bounds], axis=-1), REPORTED)
+    places = [axis.coordinate(p) for axis, p in zip(axes, positions, strict=True)]
+    mu = np.geomspace(1e-3, 1e3, places[0].size)
+    phi_F, phi_A, error = filled(core.island_answers, (*places, mu), 3, *table)
+    rigid = greenwood_tripp.rigid_sphere(places[0], mu)
+    ratios = np.stack([phi_F, phi_A], axis=-1) / rigid.T
+    np.testing.assert_allclose(ratios, np.exp(expected), rtol=1e-11)
+    inside = [np.abs(p - np.round(p)) > 1e-9 for p in positions]
+    cell = tuple(np.floor(p).astype(int)[np.all(inside, axis=0)] for p in positions)
+    np.testing.assert_array_equal(error[np.all(inside, axis=0)], bounds[cell])
 
 
 @pytest.mark.parametrize("degree", [3, 5])
@@ -124,16 +128,3 @@ def test_positions_and_coordinates_are_inverse_and_as_the_formula_says(axis, sha
     assert name == "position"
     stated = eval(right, {"__builtins__": {}}, {"log": math.log, "x": float(x)})
     assert abs(stated - axis.position(x)) <= 1e-15 * rounding
-
-
-@given(axes(), st.floats(0, 1))
-def test_error_cells_cover_the_axis_evenly(axis, share):
-    cells = error_cells(axis)
-    assert 1 <= cells <= 32
-    position = share * (axis.nodes - 1)
-    cell = int(error_cell(axis, cells, position))
-    width = (axis.nodes - 1) / cells
-    assert cell == cells - 1 or position < (cell + 1) * width * (1 + 1e-12)
-    assert position >= cell * width * (1 - 1e-12)
-    assert error_cell(axis, cells, 0.0) == 0
-    assert error_cell(axis, cells, axis.nodes - 1.0) == cells - 1
