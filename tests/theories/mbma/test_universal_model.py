@@ -136,13 +136,13 @@ def test_island4d_over_what_surfaces_visit():
     g = geometry(10 ** rng.uniform(-6, 1, count), hurst, zeta_1, REPORTED)
     found = open_table("island4d").of_islands(g | {"hurst": hurst})
     error = largest(found, greenwood_tripp.solve(g["X"], g["mu"], rtol=1e-10))
-    assert (error > found.error).mean() < 1e-3
-    assert error.max() <= 1e-3
-    assert found.error.max() <= 1e-3
+    assert (error <= found.error + 1e-10).all()
+    assert error.max() <= 2e-5
+    assert found.error.max() <= 3e-5
     # far inside the rigid limit a table has next to no error to state
     visible = error > 1e-10
     assert visible.mean() > 0.5
-    assert np.median((found.error / error)[visible]) <= 100
+    assert np.median((found.error / error)[visible]) <= 5
 
 
 def test_arguments_outside_are_marked():
@@ -158,7 +158,7 @@ def test_arguments_outside_are_marked():
 
 
 LARGEST_BYTES = {UNIVERSAL: 2e6, ISLAND4D: 16e6}
-LARGEST_ERROR = {UNIVERSAL: 1e-9, ISLAND4D: 1e-3}
+LARGEST_ERROR = {UNIVERSAL: 1e-9, ISLAND4D: 2e-5}
 
 
 @pytest.mark.parametrize("kind", KINDS)
