@@ -149,7 +149,7 @@ def test_a_table_as_an_object_is_made_once_of_arrays_that_nothing_changes():
             with pytest.raises(ValueError, match="match"):
                 core.Table(*changed)
             changed[k] = None
-            with pytest.raises(ValueError, match="match|read-only"):
+            with pytest.raises(ValueError, match=r"match|read-only"):
                 core.Table(*changed)
     wrong = model._core_table[2].copy()
     wrong[1] = -5
