@@ -158,7 +158,7 @@ class Island4d(Kind):
     ) -> FloatArray:
         """Phi_F and Phi_A by the table at coordinates of the axes, shape (entries, 2)."""
         flat = [np.ascontiguousarray(place, dtype=float).ravel() for place in places]
-        mu = band_fields(*flat[1:], self.variant)[0]
+        mu = self.arguments(*flat)[1]
         no_errors = np.zeros((*(axis.nodes - 1 for axis in axes), 2))
         table = core_table(axes, coefs, no_errors, self.variant)
         return filled(core.island_answers, (*flat, mu), 3, *table)[:2].T

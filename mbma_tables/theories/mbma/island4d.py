@@ -157,8 +157,7 @@ class Island4dModel:
         check_outside(outside)
         one = self._one(delta_over_h_rms, zeta_d, zeta_u, hurst)
         if one is not None:
-            F_hat, A_hat, error = one
-            return Lookup(np.float64(F_hat), np.float64(A_hat), np.float64(error))
+            return Lookup._make(map(np.float64, one))
         named = {
             "delta_over_h_rms": delta_over_h_rms,
             "zeta_d": zeta_d,

@@ -120,8 +120,7 @@ class UniversalModel(Ranged):
         one = self._one(X, mu)
         if one is None or outside not in OUTSIDE:
             return super().answer(X, mu, outside=outside)
-        phi_F, phi_A, error = one
-        return IslandAnswer(np.float64(phi_F), np.float64(phi_A), np.float64(error))
+        return IslandAnswer._make(map(np.float64, one))
 
     def __repr__(self) -> str:
         return f"UniversalModel({self.content.describe()})"
