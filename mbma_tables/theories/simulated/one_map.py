@@ -36,7 +36,9 @@ POWER = 0.75
 TYPICAL = 0.0025
 SENSITIVE = (0.003, 0.95)
 # of ln A by the map's own grid at `MIN_POINTS` steps a wavelength: on a grid four times
-# finer areas are 0.8 to 1.5% larger; of the second order in the step
+# finer areas are 0.8 to 1.5% larger; of the second order in the step. Along a lay the edges
+# of contacts lie alike on the grid, so that fewer of them are independent, by the anisotropy:
+# on a grid twice as fine, areas of ridges differ by up to 30% at 0.6% contact, 9% at 6%
 GRID = 0.012
 EVALUATED = 1e-5  # error of the curves through the loads; laws need not be more accurate
 STEEPEST = 8.0  # largest power of u - u1 by which an axis closes
@@ -293,7 +295,8 @@ class BoundaryElements(Theory):
             )
         stated = usual * (self.sensitivity_at(area) / TYPICAL) ** POWER
         if quantity == "area":
-            stated = np.hypot(stated, GRID * (MIN_POINTS / self.points) ** 2)
+            own = GRID * (MIN_POINTS / self.points) ** 2
+            stated = np.hypot(stated, own * (self.surface.anisotropy or 1.0) ** 0.5)
         low, high = self.rows[1, [0, -1]]
         return np.where(
             (area < low * (1 - ROUNDING)) | (area > high * (1 + ROUNDING)), np.nan, stated

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import scipy.signal
 from helpers import random_map
 from scipy.special import erf
 
@@ -265,6 +266,21 @@ def test_the_grids_own_error_is_in_the_scatter_of_the_area():
     for surface, points in ((coarse, part.shortest), (fine, 8.0)):
         found = contact(surface, area=0.4, theory=FULL)
         assert found.area_scatter > 0.012 * (4 / points) ** 2 * 0.9
+
+
+@pytest.mark.parametrize(
+    ("family", "number"), [("turned", 0), ("turned", 1), ("ground", 0), ("gaussian", 0)]
+)
+def test_areas_on_a_finer_grid_are_within_the_scatter(family, number):
+    values = makers.heights(Part(family, number, 128))
+    fine = scipy.signal.resample(scipy.signal.resample(values, 256), 256, axis=1)
+    engine = OwnContact(fine, values.shape, 1e-5)
+    area = np.array([0.02, 0.06, 0.15, 0.4])
+    surface = Surface.from_map(values, 1.0, periodic=True)
+    found = contact(surface, area=area, theory="simulated")
+    finer = [engine.press(load)["area"] for load in found.pressure.tolist()]
+    deviations = np.abs(np.log(np.array(finer) / area)) / found.area_scatter
+    assert (deviations < 2.5).all()
 
 
 @pytest.mark.parametrize("family", ["turned", "ground"])
