@@ -23,6 +23,8 @@ from mbma_tables.common.units import (
     unit_of,
 )
 from mbma_tables.export.law_rows import describe_law
+from mbma_tables.quantities.registry import registry
+from mbma_tables.quantities.registry import unit_of as unit_of_quantity
 
 # in metres and pascals, written down again: 1 in = 25.4 mm, 1 lbf = 4.4482216152605 N
 METRES = {
@@ -457,3 +459,16 @@ def test_units_of_data_arrays_have_powers():
     u = contact(bare, pressure=loads).mean_separation
     assert u.attrs["units"] == "length"
     np.testing.assert_array_equal(contact(one, mean_separation=u).mean_separation, u)
+
+
+def test_quantities_have_the_unit_of_their_declaration_alone():
+    units = Units("um", "GPa")
+    for name, declared in registry().items():
+        # an argument may have the name of a quantity
+        if name in DIMENSIONS:
+            assert unit_of(name, units) == declared.unit_in(units)
+        assert unit_of_quantity(name, units) == declared.unit_in(units)
+    assert unit_of_quantity("h_max", units) == "um"
+    for lookup in (unit_of, unit_of_quantity):
+        with pytest.raises(KeyError, match="flow_coeficient"):
+            lookup("flow_coeficient", units)

@@ -9,11 +9,11 @@ import click
 import numpy as np
 
 from mbma_tables.cli import options
-from mbma_tables.cli.format import Report, columns_of, report_answer, shown_unit, to_json
+from mbma_tables.cli.format import Report, column_unit, columns_of, report_answer, to_json
 from mbma_tables.common.arguments import finite_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.progress import echo
-from mbma_tables.common.units import unit_of
+from mbma_tables.quantities.registry import unit_of
 from mbma_tables.scenes.specimen import Specimen
 
 if TYPE_CHECKING:
@@ -79,18 +79,21 @@ def contact_command(
     )
     values, units = columns_of(pressed)
     if leakage:
-        values |= _leakage(pressed)
+        flow, units_of_flow = _leakage(pressed)
+        values |= flow
+        units |= units_of_flow
     report_answer("contact", specimen, model, pressed, values, units).write(output)
 
 
-def _leakage(answer: Contact) -> dict[str, Any]:
-    """Columns of the flow coefficient of the gaps."""
+def _leakage(answer: Contact) -> tuple[dict[str, Any], dict[str, str]]:
+    """Columns of the flow coefficient of the gaps, and their units."""
     found = answer.leakage
-    return {
+    values = {
         "leakage": found.K,
         "leakage_scatter": found.scatter,
         "leakage_valid": found.valid,
     }
+    return values, dict.fromkeys(values, "-") | {"leakage": found.units["K"]}
 
 
 @click.command(
@@ -147,9 +150,11 @@ def curve_command(
     inner = np.interp(np.log(wanted[:-1]), np.log(area[rising]), gap[rising])
     gap = np.concatenate([[surface.h_max], inner, gap[-1:]])
     answer = contact(surface, bodies, separation=gap, theory=theory)
-    values = {name: getattr(answer, name) for name in COLUMNS} | (
-        _leakage(answer) if leakage else {}
-    )
+    values = {name: getattr(answer, name) for name in COLUMNS}
+    units: dict[str, str] = {}
+    if leakage:
+        flow_values, units = _leakage(answer)
+        values |= flow_values
     picture = b""
     if plot is not None:
         title = specimen.title + (f", hardness {model.hardness}" if model.yields else "")
@@ -160,12 +165,13 @@ def curve_command(
             *(other_theory(name, surface, gap, modulus, cap) for name in others),
         ]
         labels = plots.pressure_label(unit_of("pressure", specimen.units))
-        flow = plots.leakage_label(unit_of("leakage", specimen.units))
+        flow = plots.leakage_label(unit_of("flow_coefficient", specimen.units))
         picture = plots.to_picture(
             plots.draw_compression(curves, title, labels, leakage_label=flow),
             plot.suffix[1:],
         )
-    report_answer("curve", specimen, model, answer, values).write(output, plot, picture)
+    report = report_answer("curve", specimen, model, answer, values, units)
+    report.write(output, plot, picture)
 
 
 @click.command("sensitivity", short_help="Sensitivity of results to each parameter.")
@@ -196,7 +202,7 @@ def sensitivity_command(
         **loads,
     )
     units = {
-        name: shown_unit(name, found.units)
+        name: column_unit(found.unit(name))
         for name in (*found.parameters, *found.answers)
     }
     if as_json:

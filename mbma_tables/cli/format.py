@@ -20,10 +20,10 @@ from mbma_tables.common.display import shown
 from mbma_tables.common.files import write_file
 from mbma_tables.common.plain_text import visible
 from mbma_tables.common.progress import echo
-from mbma_tables.common.units import Units, unit_of
+from mbma_tables.common.units import Units
 from mbma_tables.export.text import comment
 from mbma_tables.materials import ELASTIC_PSI
-from mbma_tables.quantities.registry import registry
+from mbma_tables.quantities.registry import registry, unit_of
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.surface import assumptions
 
@@ -294,5 +294,5 @@ def report_answer(
         told, validity = _validity(answer, model.yields)
         notes = notes + told
         facts = facts | validity
-    own = {name: shown_unit(name, specimen.units) for name in values}
+    own = {name: shown_unit(name, specimen.units) for name in values if name not in units}
     return Report(command, specimen.title, notes, facts, values, own | dict(units))

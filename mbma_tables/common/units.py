@@ -55,27 +55,28 @@ ALIASES = {
     "N/m^2": "Pa",
     "N/m2": "Pa",
 }
-# powers of length and of stress of named quantities
+# powers of length and of stress of arguments, and of numbers of surfaces and islands; those
+# of the quantities of a contact are declared in `mbma_tables.quantities`
 _NAMES_OF_POWERS = {
     (1, 0): (
         "h_rms h_max Ra Rq Rsm Sa Sq Sp longest shortest rolloff separation "
         "mean_separation delta R_d R_u sigma h_d overclosure separations "
         "mean_separations deltas dx dy short_cutoff long_cutoff s_filter l_filter "
-        "extrapolate_to width displacement radius approach reference "
-        "plane_separation separation_scatter"
+        "extrapolate_to width displacement radius approach reference"
     ),
     (0, 1): (
-        "viscosity pressure_drop E_star E E1 E2 hardness elastic_hardness pressure "
-        "pressures shear mean_pressure gas_pressure"
+        "viscosity pressure_drop E_star E E1 E2 hardness pressure pressures shear "
+        "gas_pressure"
     ),
-    (-1, 0): "q0 q1 conductance",
+    (-1, 0): "q0 q1",
     (-2, 0): "D m4",
     (2, 0): "m0 nominal_area island_area",
-    (-1, 1): "stiffness unloading_stiffness",
-    (3, 0): "leakage",
-    (1, 1): "energy",
     (2, 1): "island_force",
     (-3, 0): "island_density",
+    (0, 0): (
+        "hurst zeta_1 m2 alpha Rdq Sdq rms_gradient heights lengths extrapolate_hurst "
+        "zeta_d zeta_u eta X mu"
+    ),
 }
 DIMENSIONS: dict[str, tuple[int, int]] = {}
 for _powers, _names in _NAMES_OF_POWERS.items():
@@ -413,8 +414,12 @@ def _power(unit: str, power: int) -> str:
 
 
 def unit_of(name: str, units: Units) -> str:
-    """The unit of an argument or quantity, such as "MPa/um"; "1" for pure numbers."""
-    return Dimension(*DIMENSIONS.get(name, (0, 0))).unit(units)
+    """The unit of an argument or of a number of a surface, such as "1/um"; "1" for pure numbers.
+
+    A name that is not in `DIMENSIONS` is a KeyError: that of a quantity is in its declaration,
+    `mbma_tables.quantities.registry.unit_of`.
+    """
+    return Dimension(*DIMENSIONS[name]).unit(units)
 
 
 def force_over_area(force: Any, area: Any, length: str | None) -> str:

@@ -14,7 +14,6 @@ from mbma_tables.common.arguments import FloatArray, hinted, number_in, require
 from mbma_tables.common.display import Displayed, Variable, quantity, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import Line, draw_panels
-from mbma_tables.common.units import unit_of
 from mbma_tables.contacts.contact import contact
 from mbma_tables.quantities.lay import LAY, OPEN, SHEAR, WIDEST_LAY, factors
 from mbma_tables.quantities.leakage import shipped_flow
@@ -232,7 +231,7 @@ def flow_factors(
     }
     reasons |= {f"the model uncertainty of ln phi is above {USEFUL:g}": scatter > USEFUL}
     units = {name: found.units[name] for name in ("mean_separation", "pressure")}
-    units |= dict.fromkeys(("K_x", "K_y"), unit_of("leakage", found.unit_system))
+    units |= dict.fromkeys(("K_x", "K_y"), found.units["flow_coefficient"])
     kept = {text: mask for text, mask in reasons.items() if np.any(mask)}
     shear_scatter = np.full(u.shape, OWN_SHEAR if own else SHEAR)
     valid = ~np.logical_or.reduce(list(reasons.values()))

@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike
 from mbma_tables.bodies import Bodies
 from mbma_tables.common.arguments import FloatArray, hinted, one_number
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.units import DIMENSIONS, Units, factor, unit_of
+from mbma_tables.common.units import DIMENSIONS, Dimension, Units, factor
 from mbma_tables.contacts.contact import chosen_theory, contact
 from mbma_tables.contacts.question import Question
+from mbma_tables.quantities.registry import unit_of
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.maps import extrapolated
@@ -28,6 +29,8 @@ from mbma_tables.theories.calibrated.theory import Calibrated
 STEP = 0.02  # step of the logarithm of a parameter
 NEAR = 0.9  # share of a parameter's upper limit above which its steps go down
 MAX_ERROR = 0.05  # largest error of a slope, over itself or 1; else it is NaN
+# of a conductance over the mean conductivity of the bodies
+PER_CONDUCTIVITY = Dimension(length=-1)
 ANSWERS = ("mean_separation", "pressure", "area", "stiffness", "conductance")
 
 
@@ -50,6 +53,12 @@ class Sensitivity:
     errors: dict[str, dict[str, float]]  #: estimates of their errors
     units: Units  #: of parameters and results
 
+    def unit(self, name: str) -> str:
+        """The unit of a parameter or of a result."""
+        if name == "conductance":
+            return PER_CONDUCTIVITY.unit(self.units)
+        return unit_of(name.rpartition(".")[2], self.units)
+
     def __str__(self) -> str:
         width = max(map(len, self.parameters)) + 2
         lines = [
@@ -62,7 +71,7 @@ class Sensitivity:
                 f"{round(self.slopes[name][answer], 3) + 0.0:>17.3f}"
                 for answer in self.answers
             )
-            unit = unit_of(name.rpartition(".")[2], self.units)
+            unit = self.unit(name)
             number = f"{value:.5g} {unit}".removesuffix(" 1")
             lines.append(f"{name:{width}}{number:>22}{slopes}")
         return "\n".join(lines)

@@ -24,7 +24,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
 from mbma_tables.common.shared import frozen
-from mbma_tables.common.units import Units, unit_of
+from mbma_tables.common.units import Units
 from mbma_tables.contacts.question import Question, both_separations
 from mbma_tables.contacts.result import Setup
 from mbma_tables.core import core
@@ -33,6 +33,7 @@ from mbma_tables.law.block import AREA, FORCE, QUANTITIES, inverse_block
 from mbma_tables.law.continued import ContinuedLaw
 from mbma_tables.quantities import registry
 from mbma_tables.quantities.properties import LawQuantities
+from mbma_tables.quantities.registry import unit_of
 from mbma_tables.quantities.stiffnesses import ENERGY_OF_YIELDED
 from mbma_tables.surfaces.any_surface import AnySurface, apply
 

@@ -22,7 +22,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.plots import draw_compression, leakage_label, pressure_label
 from mbma_tables.common.shared import shared, shared_property
-from mbma_tables.common.units import Dimension, unit_of
+from mbma_tables.common.units import Dimension
 from mbma_tables.core import core
 from mbma_tables.quantities.effective_medium import (
     LARGEST_AREA,
@@ -199,8 +199,8 @@ class Leakage(Displayed):
         """Units of the quantities that are not dimensionless."""
         units = self._contact.unit_system
         return {
-            "K": unit_of("leakage", units),
-            "hydraulic_aperture": unit_of("separation", units),
+            "K": flow_coefficient.unit_in(units),
+            "hydraulic_aperture": hydraulic_aperture.unit_in(units),
         }
 
     def liquid(

@@ -13,6 +13,7 @@ import importlib
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from mbma_tables.common import units as of_arguments
 from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import MissingError
 from mbma_tables.common.units import Dimension, Units
@@ -133,3 +134,10 @@ def get(name: str) -> Quantity:
     """A quantity by its name; the error for an unknown one names the nearest."""
     require_name("quantity", name, registry())
     return registry()[name]
+
+
+def unit_of(name: str, units: Units) -> str:
+    """The unit of a quantity by its declaration, or of an argument, beside lengths and stresses in `units`."""
+    if name in registry():
+        return registry()[name].unit_in(units)
+    return of_arguments.unit_of(name, units)

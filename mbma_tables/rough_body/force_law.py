@@ -22,10 +22,11 @@ from numpy.typing import ArrayLike
 from mbma_tables.bodies import Bodies, BodiesInUnits
 from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, require
 from mbma_tables.common.errors import ConvergenceError, InputError
-from mbma_tables.common.units import SIZES, Units, factor, unit_of
+from mbma_tables.common.units import SIZES, Units, factor
 from mbma_tables.contacts.result import Setup
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import theory_law
+from mbma_tables.quantities.registry import unit_of
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import Theory, TheoryAnswer
 from mbma_tables.theories.mbma.half_space import Basis, basis, gauss_legendre, made

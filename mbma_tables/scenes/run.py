@@ -19,9 +19,8 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.plots import Curve, theory_label
 from mbma_tables.common.progress import doing
-from mbma_tables.common.units import unit_of
 from mbma_tables.materials import ELASTIC_PSI
-from mbma_tables.quantities.registry import registry
+from mbma_tables.quantities.registry import registry, unit_of
 from mbma_tables.scenes.plan import AMPLIFICATION, TABLES, Plan, Step
 from mbma_tables.scenes.problem import INVERTED, OF_CONTACT, Problem
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -386,12 +385,12 @@ OF_SCENES = {
     "nominal_pressure": ("pressure", "F/A0 as prescribed"),
     "prescribed_area": ("area", "A/A0 as prescribed"),
     "leakage": (
-        "leakage",
+        "flow_coefficient",
         "flow coefficient k h_rms^3: flow per length of seal is it dp/(12 viscosity width)",
     ),
     "leakage_valid": ("valid", "whether flow through such contacts was simulated"),
     "leakage_scatter": (
-        "scatter",
+        "leakage_scatter",
         "standard deviation of ln of the flow coefficient between simulations",
     ),
     "leakage_blocked": ("valid", "whether contact percolates"),
