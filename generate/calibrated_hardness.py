@@ -25,7 +25,7 @@ from generate.calibrated_file import (
 from generate.files import read_csv
 from mbma_tables import Bodies, Surface, contact
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.theories import get_theory
+from mbma_tables.theories import resolve
 from mbma_tables.theories.evidence import shipped_deviations
 from mbma_tables.theories.yielding import formulas as cap
 from mbma_tables.theories.yielding.theory import GROUP, Scatter, Yielding
@@ -168,7 +168,7 @@ def errors_of_other(
 ) -> dict[str, FloatArray]:
     """Errors of force, area and frozen stiffness of a theory that is not the calibrated one."""
     surface = one.surface
-    theory = get_theory(name)
+    theory = resolve(name)
     gradient = float(surface.rms_gradient)
     force = np.full(one.u.size, np.nan)
     area = np.full(one.u.size, np.nan)

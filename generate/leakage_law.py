@@ -38,7 +38,7 @@ from mbma_tables.data import FILE
 from mbma_tables.quantities import effective_medium as leakage
 from mbma_tables.quantities.effective_medium import FlowConstants
 from mbma_tables.quantities.leakage import GROUP
-from mbma_tables.theories import get_theory
+from mbma_tables.theories import resolve
 from mbma_tables.theories.calibrated.formulas import (
     Constants,
     Law,
@@ -110,9 +110,7 @@ class Case(Simulated):
         """
         if self.kind == "yielded":
             hardness = float(self.node[-1]) * self.spectrum.gradient
-            curve = TheoryCurve(
-                Yielding(get_theory("calibrated"), hardness), self.surface
-            )
+            curve = TheoryCurve(Yielding(resolve("calibrated"), hardness), self.surface)
             return curve.area(self.force), curve.separation(self.force)
         law = Law(self.spectrum, self.h_max, constants)
         return law.area(self.force), law.separation(self.force)

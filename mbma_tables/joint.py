@@ -28,7 +28,7 @@ from mbma_tables.common.units import (
     factor,
     force_over_area,
 )
-from mbma_tables.contacts.contact import chosen_theory, contact_of
+from mbma_tables.contacts.contact import contact_of
 from mbma_tables.contacts.result import Contact
 from mbma_tables.contacts.sensitivity import (
     OfOneMap,
@@ -51,7 +51,7 @@ from mbma_tables.scenes.specimen import read_toml
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import TOPS
 from mbma_tables.surfaces.surface import Surface, assumptions
-from mbma_tables.theories import OF_MAPS, THEORIES, get_theory, theory_text
+from mbma_tables.theories import OF_MAPS, THEORIES, resolve, theory_text
 from mbma_tables.theories.base import Theory
 
 if TYPE_CHECKING:
@@ -249,7 +249,7 @@ class Joint(JointQuantities, Displayed):
                     "theory='calibrated' applies"
                 )
         elif self.theory is not None:
-            get_theory(self.theory, self.surface)
+            resolve(self.theory, self.surface)
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Joint:
@@ -349,7 +349,7 @@ class Joint(JointQuantities, Displayed):
         'conductance goes like Rq^-0.67'
         """
         in_units = self._in_units
-        chosen = chosen_theory(self.surface, self.theory)
+        chosen = resolve(self.theory, self.surface)
         moduli, modulus_of = self._moduli(in_units)
         return relative_derivatives(
             self._unknowns(chosen),

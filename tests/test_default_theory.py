@@ -22,7 +22,7 @@ from mbma_tables.cli import main
 from mbma_tables.export.explorer import explorer_page
 from mbma_tables.export.exported_law import exported_law
 from mbma_tables.export.law_rows import describe_law
-from mbma_tables.theories import Mbma, theory_name
+from mbma_tables.theories import Mbma, resolve
 
 NUMBERS = {"hurst": 0.8, "q0": 0.05, "q1": 1.5, "h_rms": 0.5, "h_max": 1.75}
 E_STAR = "100 GPa"
@@ -60,14 +60,18 @@ KINDS = [(expected, make) for expected, makes in SURFACES.items() for make in ma
 def test_the_rule(expected, make):
     surface = make()
     for by in (None, "mean_separation", "pressure", "area"):
-        assert theory_name(surface, None, by) == expected
-        assert theory_name(surface, "persson", by) == "persson"
+        assert resolve(None, surface, by).name == expected
+        assert resolve("persson", surface, by).name == "persson"
         printed = Mbma(variant="printed")
-        assert theory_name(surface, printed, by) is printed
+        assert resolve(printed, surface, by) is printed
         exact = Mbma(island_model="exact", variant="reported")
-        assert theory_name(surface, exact, by) is exact
-    assert theory_name(surface, None, "separation") == "mbma"
-    assert theory_name(surface, "calibrated", "separation") == "calibrated"
+        assert resolve(exact, surface, by) is exact
+        assert resolve(None, surface, by, {"variant": "printed"}) == printed
+        assert resolve("mbma", surface, by, {"island_model": "exact"}) == exact
+        with pytest.raises(InputError, match="grid: options of theory 'simulated' alone"):
+            resolve("calibrated", surface, by, {"grid": "full"})
+    assert resolve(None, surface, "separation").name == "mbma"
+    assert resolve("calibrated", surface, "separation").name == "calibrated"
 
 
 @pytest.mark.parametrize(("expected", "make"), KINDS)

@@ -30,7 +30,7 @@ from mbma_tables import (
     sensitivity,
 )
 from mbma_tables.common.files import shipped_file
-from mbma_tables.theories import THEORIES, BoundaryElements, get_theory
+from mbma_tables.theories import THEORIES, BoundaryElements, resolve
 
 PACKAGE = pathlib.Path(mbma_tables.__file__).parent
 ROUGH = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.5, unit="um")
@@ -295,7 +295,7 @@ OBJECTS = {
     "law that yields": (made_law_that_yields, asked_law),
     "joint": (made_joint, asked_joint),
     **{
-        name: (functools.partial(get_theory, name), asked_theory)
+        name: (functools.partial(resolve, name), asked_theory)
         for name in sorted(THEORIES)
     },
     "own table": (made_own_table, asked_own_table),

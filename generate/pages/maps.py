@@ -28,7 +28,7 @@ from mbma_tables.contacts.measurement import curves, draw
 from mbma_tables.scenes.specimen import measured
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated, mirrored
-from mbma_tables.theories import BoundaryElements, get_theory
+from mbma_tables.theories import BoundaryElements, resolve
 from mbma_tables.theories.base import Theory
 from mbma_tables.theories.calibrated.curves import own_law
 from mbma_tables.theories.simulated.boundary_elements import LOADS
@@ -228,7 +228,7 @@ def summary(simulations: Sequence[Seen]) -> list[Cell]:
     """
     cells: list[Cell] = []
     for name, (low, high) in RANGES.items():
-        theory = get_theory(name)
+        theory = resolve(name)
         parts = []
         for _, surface, rows in simulations:
             inside = (rows[1] >= low) & (rows[1] <= high)

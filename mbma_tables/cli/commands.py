@@ -74,7 +74,7 @@ def contact_command(
     pressed = contact(
         specimen.surface,
         model.bodies(specimen, conductivity),
-        theory=model.configured_theory(),
+        theory=model.theory,
         **load,
     )
     values, units = columns_of(pressed)
@@ -137,11 +137,10 @@ def curve_command(
     model = model.of(specimen.surface)
     surface = specimen.surface
     bodies = model.bodies(specimen)
-    theory = model.configured_theory()
+    theory = model.theory
     modulus = 1.0 if specimen.E_star is None else specimen.E_star
     gap = float(surface.h_max) * SEARCHED
-    if model.theory != "mbma":
-        gap = gap[np.isfinite(other_theory(model.theory, surface, gap, 1.0).pressure)]
+    gap = gap[np.isfinite(other_theory(theory, surface, gap, 1.0).pressure)]
     area = np.asarray(contact(surface, bodies, separation=gap, theory=theory).area)
     rising = slice(np.flatnonzero(area > 0)[0], int(area.argmax()) + 1)
     wanted = np.geomspace(
@@ -159,7 +158,7 @@ def curve_command(
     if plot is not None:
         title = specimen.title + (f", hardness {model.hardness}" if model.yields else "")
         cap = answer.bodies.hardness
-        others = [name for name in DRAWN if name != model.theory]
+        others = [name for name in DRAWN if name != theory.name]
         curves = [
             answer.curve(leakage),
             *(other_theory(name, surface, gap, modulus, cap) for name in others),
@@ -198,7 +197,7 @@ def sensitivity_command(
     found = sensitivity(
         specimen.surface,
         model.bodies(specimen),
-        theory=model.configured_theory(),
+        theory=model.theory,
         **loads,
     )
     units = {
@@ -206,14 +205,14 @@ def sensitivity_command(
         for name in (*found.parameters, *found.answers)
     }
     if as_json:
-        echo(to_json(vars(found) | {"theory": model.theory, "units": units}))
+        echo(to_json(vars(found) | {"theory": model.theory.name, "units": units}))
         return
     here = ", ".join(
         f"{name} {value:.6g} {units[name]}".removesuffix(" -")
         for name, value in found.answers.items()
     )
     echo(
-        f"mbma sensitivity: {specimen.title}, theory {model.theory}\nhere: {here}\n\n{found}"
+        f"mbma sensitivity: {specimen.title}, theory {model.theory.name}\nhere: {here}\n\n{found}"
     )
 
 
@@ -240,6 +239,7 @@ def island_command(
         raise InputError("approaches are needed: --delta")
     from mbma_tables.theories.mbma.island import island
 
+    model = model._replace(theory="mbma").of(specimen.surface)
     answer = island(
         specimen.surface,
         finite_array("delta", specimen.units.number("delta", delta)),
@@ -304,7 +304,6 @@ def fit_command(
     options.check_plot(plot, output.out)
     from mbma_tables.common.plots import pressure_label, to_picture
     from mbma_tables.common.units import Units
-    from mbma_tables.contacts.contact import chosen_theory
     from mbma_tables.contacts.measurement import (
         areal,
         curves,
@@ -314,7 +313,7 @@ def fit_command(
     )
     from mbma_tables.scenes.specimen import effective_modulus_of, measured
     from mbma_tables.surfaces.averages import average
-    from mbma_tables.theories import Simulated, theory_name
+    from mbma_tables.theories import Simulated, default_name, resolve
 
     modulus, stress_unit = effective_modulus_of(
         {} if E_star is None else {"E_star": E_star}
@@ -323,7 +322,7 @@ def fit_command(
     surface = scans[0][1] if len(scans) == 1 else average([scan for _, scan in scans])
     scale = 1.0 if modulus is None else modulus
     full = Simulated(grid="full")
-    theory = full.name if simulate else theory_name(surface, None, "area")
+    theory = full.name if simulate else default_name(surface, "area")
     tabulated = full if simulate else theory
     columns, told = table_of_loads(surface, scale, tabulated)
     if simulate and output.out is not None and output.out.suffix == ".nc":
@@ -345,7 +344,7 @@ def fit_command(
             draw(scans[0][0], surface, curves(surface, scale), title, label),
             plot.suffix[1:],
         )
-    departures = chosen_theory(surface, tabulated, "area").departures(surface)
+    departures = resolve(tabulated, surface, "area").departures(surface)
     notes = [*described(surface, departures), f"table by theory {theory}", *told]
     Report("fit", title, notes, facts, columns, own).write(output, plot, picture)
 

@@ -266,19 +266,19 @@ def report_answer(
     if specimen.E_star is not None:
         scale = f"E* is {specimen.E_star:.6g} {stress}".rstrip()
     made = (
-        f", variant {answer.variant}, island model {answer.island_model}, rtol {model.rtol:g}"
+        f", variant {answer.variant}, island model {answer.island_model}, rtol {model.theory.options['rtol']:g}"
         if answer.variant
         else ""
     )
     notes += [
-        f"theory {model.theory}{made}; {scale}",
+        f"theory {model.theory.name}{made}; {scale}",
         "error: relative, numerical, beside the theory's scatter",
     ]
     facts = {
-        "theory": model.theory,
+        "theory": model.theory.name,
         "variant": answer.variant or None,
         "island_model": answer.island_model or None,
-        "rtol": model.rtol if model.theory == "mbma" else None,
+        "rtol": model.theory.options.get("rtol"),
         "hardness": model.hardness if model.yields else None,
         "E_star": specimen.E_star,
         "stress_unit": specimen.stress_unit,

@@ -38,7 +38,7 @@ class Model(NamedTuple):
     island_model: str
     variant: str
     rtol: float
-    theory: Any = None  # a name; by the surface where none is given
+    theory: Any = None  # a name or None, and after `of` an object
     hardness: float | str | None = None
     grid: str | None = None  # of theory "simulated"
 
@@ -48,42 +48,26 @@ class Model(NamedTuple):
         return self.hardness not in (None, math.inf)
 
     def of(self, surface: AnySurface, given_name: str | None = None) -> Model:
-        """The same options, with the theory's name for a contact at a given quantity, None for a curve."""
-        from mbma_tables.theories import theory_name
+        """The same with the theory as an object, for a contact at a given quantity, None for a curve."""
+        from mbma_tables.theories import resolve
 
-        if self.theory is None and self._options_of_mbma():
-            return self._replace(theory="mbma")
-        by_option = None if self.grid is None else "simulated"
-        name = theory_name(surface, self.theory or by_option, given_name)
-        if by_option not in (None, name):
-            raise InputError(
-                f"--grid is of theory 'simulated', not of {name!r}: leave it out"
-            )
-        return self._replace(theory=name)
+        theory = resolve(self.theory, surface, given_name, self._changed_options())
+        return self._replace(theory=theory)
 
-    def _options_of_mbma(self) -> list[str]:
-        """Names of the options of MBMA that differ from their defaults."""
+    def _changed_options(self) -> dict[str, Any]:
+        """Options of theories that differ from their defaults."""
         defaults = {
             "island_model": "universal",
             "variant": "reported",
             "rtol": DEFAULT_RTOL,
+            "grid": None,
         }
-        return [name for name in defaults if getattr(self, name) != defaults[name]]
-
-    def configured_theory(self) -> Any:
-        """The theory with its options, as the library takes it."""
-        from mbma_tables.theories import Mbma, Simulated
-
-        if self.grid is not None:
-            return Simulated(self.grid)
-        if self.theory == "mbma":
-            return Mbma(self.island_model, self.variant, self.rtol)
-        options = self._options_of_mbma()
-        if options:
-            raise InputError(
-                f"{', '.join(options)}: options of theory 'mbma' alone, given by its name"
-            )
-        return self.theory
+        changed = {}
+        for name, default in defaults.items():
+            value = getattr(self, name)
+            if value != default:
+                changed[name] = value
+        return changed
 
     def bodies(
         self, specimen: Specimen, conductivity: Sequence[float | str] | None = None

@@ -26,7 +26,7 @@ from mbma_tables.contacts.question import GAPS, Question, both_separations
 from mbma_tables.contacts.result import Contact, Setup
 from mbma_tables.quantities.interface import NOTHING_BETWEEN, Interface
 from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
-from mbma_tables.theories import THEORIES, default_theory, get_theory, theory_name
+from mbma_tables.theories import resolve
 from mbma_tables.theories.base import (
     Solved,
     Theory,
@@ -133,9 +133,7 @@ def contact_of(
     """The contact at one given quantity, with what a joint has between its bodies."""
     in_units = Bodies.of(bodies).in_units(surface)
     question = Question.of(in_units.units, candidates)
-    setup = Setup(
-        surface, in_units, chosen_theory(surface, theory, question.name), interface
-    )
+    setup = Setup(surface, in_units, resolve(theory, surface, question.name), interface)
     if any_labelled(surface, question.value, in_units.E_star, in_units.hardness):
         return _of_labelled(setup, question)
     solved, gaps = _solved(setup, surface, question, in_units.E_star, in_units.hardness)
@@ -146,18 +144,6 @@ def contact_of(
         **gaps,
     }
     return Contact(setup, values, solved.islands, solved.answer, solved.loaded)
-
-
-def chosen_theory(
-    surface: AnySurface,
-    theory: str | Theory | UserTheory | None,
-    given_name: str | None = None,
-) -> Theory:
-    """The theory asked for, or the default of `theory_name` where a quantity of that name is given."""
-    name_or_theory = theory_name(surface, theory, given_name)
-    if isinstance(name_or_theory, str) and name_or_theory in THEORIES:
-        return default_theory(name_or_theory)
-    return get_theory(name_or_theory, surface)
 
 
 def _solved(

@@ -12,7 +12,7 @@ from mbma_tables.surfaces.heights import SHARES
 from mbma_tables.surfaces.roughness import areal_parameters
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
-from mbma_tables.theories import get_theory
+from mbma_tables.theories import resolve
 from mbma_tables.theories.base import UserTheory
 from mbma_tables.theories.users import answer_where_finite
 
@@ -93,7 +93,7 @@ def curves(
     u = float(surface.h_max) * GAPS
     found = {}
     for name in DRAWN:
-        theory = get_theory(name, surface)
+        theory = resolve(name, surface)
         try:
             answer = answer_where_finite(theory, surface, u)
         except MbmaError:
@@ -271,7 +271,7 @@ def table_of_loads(
     surface: MeasuredSurface, E_star: float = 1.0, theory: str | UserTheory | None = None
 ) -> tuple[dict[str, Any], list[str]]:
     """Columns of a theory's results at a few contact areas, and text lines on those omitted or not valid."""
-    from mbma_tables.contacts.contact import chosen_theory, contact
+    from mbma_tables.contacts.contact import contact
 
     def contacts(some: FloatArray) -> str:
         return f"contact of {', '.join(f'{area:g}' for area in some)}"
@@ -304,7 +304,7 @@ def table_of_loads(
         name: np.asarray(getattr(found, name))[reached] for name in names
     }
     reasons = found.reasons
-    everywhere = chosen_theory(surface, theory, "area").departures(surface)
+    everywhere = resolve(theory, surface, "area").departures(surface)
     told += [
         f"not valid at {contacts(areas[m])}: {text}"
         for text, m in reasons.items()

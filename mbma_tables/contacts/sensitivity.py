@@ -15,7 +15,7 @@ from mbma_tables.bodies import Bodies
 from mbma_tables.common.arguments import FloatArray, hinted, one_number
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import DIMENSIONS, Dimension, Units, factor
-from mbma_tables.contacts.contact import chosen_theory, contact
+from mbma_tables.contacts.contact import contact
 from mbma_tables.contacts.question import Question
 from mbma_tables.quantities.registry import unit_of
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -23,6 +23,7 @@ from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.maps import extrapolated
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
+from mbma_tables.theories import resolve
 from mbma_tables.theories.base import Theory, UserTheory
 from mbma_tables.theories.calibrated.theory import Calibrated
 
@@ -138,7 +139,7 @@ def sensitivity(
         "area": area,
     }
     question = Question.of(in_units.units, candidates)
-    chosen = chosen_theory(surface, theory, question.name)
+    chosen = resolve(theory, surface, question.name)
     return relative_derivatives(
         unknowns_of(surface, chosen),
         chosen,

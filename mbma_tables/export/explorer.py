@@ -24,7 +24,7 @@ from mbma_tables.materials import hardness_in
 from mbma_tables.quantities.validity import MAX_GRADIENT
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
-from mbma_tables.theories import OF_MAPS, tested, theory_name
+from mbma_tables.theories import OF_MAPS, default_name, tested
 from mbma_tables.theories.evidence import COMPARED, QUANTITIES, shipped_deviations
 from mbma_tables.theories.mbma import theory as mbma
 from mbma_tables.theories.mbma.tables import universal_model
@@ -146,9 +146,9 @@ def explorer_page(
     """
     measured = isinstance(surface, MeasuredSurface)
     chosen = get_variant(variant)
-    if theory is None and chosen != get_variant("reported"):
-        theory = "mbma"
-    theory = theory_name(surface, theory)
+    if theory is None:
+        options = () if chosen == get_variant("reported") else ("variant",)
+        theory = default_name(surface, options=options)
     # a page has no simulation of a map
     theory = "calibrated" if theory in OF_MAPS else theory
     if theory == "mbma" and measured:

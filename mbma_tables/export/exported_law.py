@@ -14,7 +14,7 @@ from mbma_tables.bodies import Bodies
 from mbma_tables.common.arguments import FloatArray, Numbers, number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor, in_unit
-from mbma_tables.contacts.contact import chosen_theory, contact
+from mbma_tables.contacts.contact import contact
 from mbma_tables.export.text import about, number
 from mbma_tables.law import block as at
 from mbma_tables.law.law import ContactLaw
@@ -28,8 +28,8 @@ from mbma_tables.rough_body.force_law import ForceLaw
 from mbma_tables.rough_body.rough_contact import pressed
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.theories import resolve
 from mbma_tables.theories.base import Theory, UserTheory
-from mbma_tables.theories.mbma.theory import Mbma
 from mbma_tables.theories.mbma.variants import Variant
 
 LAW_RTOL = 1e-8
@@ -387,22 +387,12 @@ def exported_law(
     if one.shape != ():
         raise InputError("a contact law is of one surface, not of a batch")
     number_in("E_star", bodies.E_star, 1e-300, 1e300)
-    chosen = chosen_theory(one, _with_variant(theory, variant))
+    options = {} if variant == "reported" else {"variant": variant}
+    chosen = resolve(theory, one, options=options)
     law = law_of(one, bodies, chosen, LAW_RTOL)
     return ExportedLaw(
         one, law, chosen, law.E_star, law.hardness, length, stress, made_by, direction
     )
-
-
-def _with_variant(
-    theory: str | Theory | UserTheory | None, variant: str | Variant
-) -> Any:
-    """MBMA in a variant of the paper, which other theories do not have."""
-    if variant == "reported":
-        return theory
-    if theory not in (None, "mbma"):
-        raise InputError("variant: an option of theory 'mbma' alone, given by its name")
-    return Mbma(variant=variant)
 
 
 def _known(length: str | None, stress: str | None) -> tuple[str, str]:

@@ -12,12 +12,12 @@ from mbma_tables.bodies import Bodies, BodiesInUnits
 from mbma_tables.common.arguments import FloatArray, checked_hardness, hinted, number_in
 from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.common.shared import frozen
-from mbma_tables.contacts.contact import chosen_theory
 from mbma_tables.contacts.result import Setup
 from mbma_tables.law import block as fit
 from mbma_tables.law.law import ROUNDING, ContactLaw
 from mbma_tables.quantities.interface import NOTHING_BETWEEN, Interface
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.theories import resolve
 from mbma_tables.theories.base import Compression, Theory, UserTheory
 
 MIN_LAW_RTOL = 1e-9
@@ -112,7 +112,7 @@ def law_of(
         )
     given.require_one_conductivity()
     one = _one_surface(surface)
-    chosen = chosen_theory(surface, theory)
+    chosen = resolve(theory, surface)
     asked = max(chosen.rtol, MIN_LAW_RTOL) if rtol is None else rtol
     tolerance = number_in("rtol", asked, MIN_LAW_RTOL, MAX_RTOL)
     setup = Setup(one, given.at(modulus, float(hardness)), chosen, interface)

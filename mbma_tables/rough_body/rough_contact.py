@@ -22,7 +22,7 @@ from mbma_tables.common.arguments import (
 from mbma_tables.common.display import Displayed, Variable, quantity, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import new_figure
-from mbma_tables.contacts.contact import chosen_theory, contact
+from mbma_tables.contacts.contact import contact
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import contact_law
 from mbma_tables.rough_body.force_law import (
@@ -35,6 +35,7 @@ from mbma_tables.rough_body.force_law import (
     units_of,
 )
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.theories import resolve
 from mbma_tables.theories.base import Theory
 from mbma_tables.theories.calibrated.formulas import Spectrum, spectrum_of
 from mbma_tables.theories.mbma.half_space import basis
@@ -240,7 +241,7 @@ def rough_contact(
     fixed = JOHNSON * R if reference is None else units.number("reference", reference)
     if not plane and reference is not None:
         raise InputError("reference is of a cylinder: leave it out")
-    layer_theory = chosen_theory(surface, theory)
+    layer_theory = resolve(theory, surface)
     fixed = number_in("reference", fixed, 1e-30 * R, largest)
     body = Body(law, R, plane, fixed, surface, layer_theory, *units_of(units, plane))
     if (approach is None) == (force is None):

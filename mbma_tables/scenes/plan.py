@@ -504,7 +504,7 @@ class _Planner:
 
     def theory_error(self) -> float:
         """Bound of the scene's theory on its numerical error."""
-        from mbma_tables.theories import get_theory
+        from mbma_tables.theories import resolve
 
         surface = self.problem.surface
         gaps = self.problem.gaps
@@ -516,7 +516,7 @@ class _Planner:
         elif self.problem.prescribed not in INVERTED:
             farthest = np.max((h_max + gaps) / 2)
         u = min(max(farthest, 0.5 * h_max), LAST * h_max)
-        theory = get_theory(self.problem.theory, surface)
+        theory = resolve(self.problem.theory, surface)
         return float(theory.answer(surface, np.asarray(u)).error)
 
 

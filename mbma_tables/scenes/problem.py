@@ -20,7 +20,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, modulus_and_units, require_surface
 from mbma_tables.materials import hardness_in
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories import OF_MAPS, THEORIES, get_theory, theory_name
+from mbma_tables.theories import OF_MAPS, THEORIES, default_name, resolve
 from mbma_tables.theories.mbma.island_models import ISLAND_MODELS, AnyModel
 from mbma_tables.theories.mbma.variants import Variant, get_variant
 
@@ -128,8 +128,7 @@ class Problem:
         if get_variant(self.variant) != get_variant("reported"):
             return "mbma"
         given_name = "separation" if self.separations is not None else None
-        by_rule: str = theory_name(self.surface, None, given_name)
-        return by_rule
+        return default_name(self.surface, given_name)
 
     def _set_tolerance(self) -> None:
         """Set `rtol`: as given, by default, or None where a time budget is given."""
@@ -250,7 +249,7 @@ class Problem:
         if isinstance(self.theory, str):
             require_name("theory", self.theory, (*THEORIES, *OF_MAPS))
         else:
-            get_theory(self.theory, self.surface)
+            resolve(self.theory, self.surface)
         for name in self.theories:
             require_name("theory", name, THEORIES)
         if self.theory_name in self.theories:

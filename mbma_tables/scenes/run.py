@@ -295,29 +295,29 @@ def profiles(run: Run, step: Step) -> None:
 
 
 def other_theory(
-    name: str,
+    theory: Any,
     surface: AnySurface,
     gap: FloatArray,
     E_star: float,
     hardness: float = math.inf,
 ) -> Curve:
-    """A theory, by its name, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
-    from mbma_tables.theories import get_theory
+    """A theory, given as for `contact`, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
+    from mbma_tables.theories import resolve
     from mbma_tables.theories.users import answer_where_finite
 
-    theory = get_theory(name, surface)
+    chosen = resolve(theory, surface)
     u = (float(surface.h_max) + gap) / 2
     if hardness < math.inf:
-        theory = theory.with_hardness(hardness, E_star)
-    answer = answer_where_finite(theory, surface, u)
+        chosen = chosen.with_hardness(hardness, E_star)
+    answer = answer_where_finite(chosen, surface, u)
     of_pressure, of_area = answer._fields[:2]
     return Curve(
-        theory_label(name),
+        theory_label(chosen.name),
         u / surface.h_rms,
         E_star * answer.pressure,
         answer.area,
-        theory.scatter(surface, of_pressure, answer.area),
-        theory.scatter(surface, of_area, answer.area),
+        chosen.scatter(surface, of_pressure, answer.area),
+        chosen.scatter(surface, of_area, answer.area),
     )
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import reprlib
+import types
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
 from mbma_tables.common.errors import InputError
@@ -33,12 +36,11 @@ __all__ = [
     "TheoryAnswer",
     "UserTheory",
     "Variant",
-    "default_theory",
-    "get_theory",
-    "theory_name",
+    "default_name",
+    "resolve",
 ]
 
-THEORIES = ("mbma", "calibrated", "persson", "greenwood_williamson")
+# the shipped theories: names and classes, whose fields are their options
 _NAMED = {
     "mbma": "Mbma",
     "calibrated": "Calibrated",
@@ -46,6 +48,9 @@ _NAMED = {
     "greenwood_williamson": "GreenwoodWilliamson",
     "simulated": "Simulated",
 }
+OF_MAPS = ("simulated",)  # theories of one map, made by simulating it
+THEORIES = tuple(name for name in _NAMED if name not in OF_MAPS)
+NONE: Mapping[str, Any] = types.MappingProxyType({})
 # a theory's module is imported when first needed
 _HOMES = {
     "Mbma": "mbma.theory",
@@ -60,14 +65,6 @@ _HOMES = {
     "TheoryAnswer": "base",
     "UserTheory": "base",
 }
-OF_MAPS = ("simulated",)  # theories of one map, made by simulating it
-# of MBMA
-OPTIONS = {
-    "island_model": "universal",
-    "variant": "reported",
-    "rtol": 1e-8,
-    "outside": "raise",
-}
 
 
 def __getattr__(name: str) -> Any:
@@ -76,30 +73,65 @@ def __getattr__(name: str) -> Any:
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory:
-    """A theory by name, or as an object: one of this package's, or any with a `name` and an `answer`.
+def resolve(
+    theory: str | Theory | UserTheory | Simulated | None,
+    surface: Any = None,
+    given_name: str | None = None,
+    options: Mapping[str, Any] = NONE,
+) -> Theory:
+    """The theory that is asked for, or the default one: of contacts, laws, joints, scenes, exports and commands.
 
-    "simulated" and `Simulated` are theories of one `surface`, made from a map: the simulation
-    of that map, kept for the last eight of them.
+    Parameters
+    ----------
+    theory : str, theory or None
+        A name, an object, or None for that of `default_name`. An object is one of this
+        package's, or any with a `name` and an `answer`.
+    surface : Surface, optional
+        For the default, and for "simulated" and `Simulated`, which are theories of one
+        surface: the simulation of its map, kept for the last eight of them.
+    given_name : str, optional
+        As for `default_name`.
+    options : mapping, optional
+        Options of a theory that is not given as an object, as commands and files have them.
 
     Raises
     ------
     InputError
-        For an unknown name, an object that is not a theory, and theories of a map for a
-        surface without one.
+        For an unknown name, an object that is not a theory or has a hardness, options that
+        the theory does not have, and theories of a map for a surface without one.
 
     Examples
     --------
-    >>> from mbma_tables.theories import get_theory
-    >>> get_theory("persson").name
-    'persson'
+    >>> from mbma_tables import Surface
+    >>> from mbma_tables.theories import resolve
+    >>> road = Surface.named("concrete")
+    >>> resolve(None, road, "pressure"), resolve(None, road, "separation"), resolve("persson")
+    (Calibrated(), Mbma(), Persson())
+    >>> resolve(None, road, options={"rtol": 1e-4})
+    Mbma(rtol=0.0001)
     """
-    from mbma_tables.theories.base import Theory, UserTheory
-    from mbma_tables.theories.users import Wrapped
-
     chosen: Any = theory
-    if isinstance(theory, str) and theory in _NAMED:
-        chosen = __getattr__(_NAMED[theory])()
+    if chosen is None and surface is not None:
+        chosen = default_name(surface, given_name, options)
+    if isinstance(chosen, str) and chosen in _NAMED:
+        chosen = _with_options(chosen, options) if options else _shipped(chosen)
+    elif options:
+        raise InputError(
+            f"{', '.join(options)}: options of a theory given by its name, got {chosen!r}"
+        )
+    return _of_object(chosen, surface)
+
+
+@shared()
+def _shipped(name: str) -> Any:
+    """A shipped theory with its defaults, made once per process."""
+    return __getattr__(_NAMED[name])()
+
+
+def _of_object(chosen: Any, surface: Any) -> Theory:
+    """A theory as an object of this package."""
+    from mbma_tables.theories.base import Theory, UserTheory
+
     if isinstance(chosen, Theory):
         if chosen.elastic is not chosen:
             raise InputError(
@@ -109,6 +141,7 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
         return chosen
 
     from mbma_tables.theories.simulated.theory import Simulated
+    from mbma_tables.theories.users import Wrapped
 
     if isinstance(chosen, Simulated):
         return chosen.of(surface)
@@ -116,52 +149,65 @@ def get_theory(theory: str | Theory | UserTheory, surface: Any = None) -> Theory
         return Wrapped(chosen)
     raise InputError(
         f"theory must be one of {(*THEORIES, *OF_MAPS)} or an object with a name and answer(surface, u), "
-        f"got {reprlib.repr(theory)}"
+        f"got {reprlib.repr(chosen)}"
     )
 
 
-@shared()
-def default_theory(name: str) -> Theory:
-    """One of `THEORIES` with its defaults, made once per process."""
-    return get_theory(name)
+def _with_options(name: str, options: Mapping[str, Any]) -> Any:
+    """A shipped theory with options; those that it does not have are refused."""
+    make = __getattr__(_NAMED[name])
+    others = [option for option in options if option not in _options_of(name)]
+    if others:
+        owners = [other for other in _NAMED if others[0] in _options_of(other)]
+        of = f" of theory {owners[0]!r} alone" if owners else ""
+        raise InputError(f"{', '.join(others)}: options{of}, not of {name!r}")
+    return make(**options)
 
 
-def theory_name(
+def _options_of(name: str) -> list[str]:
+    """Names of the options of a shipped theory."""
+    make = __getattr__(_NAMED[name])
+    return [field.name for field in dataclasses.fields(make)]
+
+
+def default_name(
     surface: AnySurface,
-    theory: str | Theory | UserTheory | None,
     given_name: str | None = None,
-) -> Any:
-    """The given theory, or the default one: the rule of contacts, laws, joints, scenes, exports and commands.
+    options: Collection[str] = (),
+) -> str:
+    """The name of the theory where none is given.
 
     Parameters
     ----------
     surface : Surface
         One surface or a batch.
-    theory : str, theory or None
-        What the caller gave; anything but None is returned as it is.
     given_name : str, optional
         The quantity at which the contact is asked for, "separation", "mean_separation",
         "pressure" or "area"; None for laws and curves, which are functions of the mean
         separation.
+    options : collection of str, optional
+        Names of options that are given without a theory.
 
     Returns
     -------
-    str or theory
-        By default "mbma" at a given separation d, which is MBMA's coordinate; else
-        "simulated" for a surface opened from the table of its simulation, and for a map that
-        is resolved and of at most 2^18 points; and "calibrated" for every other
-        surface.
+    str
+        The theory that has the options, if there are any. Else "mbma" at a given separation
+        d, which is MBMA's coordinate; "simulated" for a surface opened from the table of its
+        simulation, and for a map that is resolved and of at most 2^18 points; and
+        "calibrated" for every other surface.
 
     Examples
     --------
     >>> from mbma_tables import Surface
-    >>> from mbma_tables.theories import theory_name
+    >>> from mbma_tables.theories import default_name
     >>> road = Surface.named("concrete")
-    >>> theory_name(road, None, "pressure"), theory_name(road, None, "separation"), theory_name(road, "persson")
-    ('calibrated', 'mbma', 'persson')
+    >>> default_name(road, "pressure"), default_name(road, "separation"), default_name(road, options=["variant"])
+    ('calibrated', 'mbma', 'mbma')
     """
-    if theory is not None:
-        return theory
+    for option in options:
+        for name in _NAMED:
+            if option in _options_of(name):
+                return name
     if given_name == "separation":
         return "mbma"
     if getattr(surface, "table", None) is not None:
@@ -180,5 +226,5 @@ def theory_text(surface: AnySurface, theory: str | Theory | UserTheory | None) -
 
         if is_for_simulation(surface):
             return "simulated, or calibrated if the simulation does not converge"
-    name_or_theory = theory_name(surface, theory)
+    name_or_theory = default_name(surface) if theory is None else theory
     return str(getattr(name_or_theory, "name", name_or_theory))

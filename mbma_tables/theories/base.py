@@ -216,9 +216,9 @@ class Theory(abc.ABC):
         --------
         >>> import numpy as np
         >>> from mbma_tables import Surface
-        >>> from mbma_tables.theories import get_theory
+        >>> from mbma_tables.theories import resolve
         >>> surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
-        >>> metal = get_theory("calibrated").with_hardness(1500.0, E_star=100e3)
+        >>> metal = resolve("calibrated").with_hardness(1500.0, E_star=100e3)
         >>> f"{metal.area_at(surface, np.array(3e-4)):.4f}"
         '0.0210'
         """

@@ -28,7 +28,7 @@ from mbma_tables import (
     island,
 )
 from mbma_tables.common.files import shipped_file
-from mbma_tables.theories import THEORIES, Mbma, Theory, TheoryAnswer, get_theory
+from mbma_tables.theories import THEORIES, Mbma, Theory, TheoryAnswer, resolve
 
 ROOT = pathlib.Path(__file__).parents[2]
 SURFACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
@@ -363,7 +363,7 @@ def test_calls_of_other_packages_do_not_count_wherever_they_lie():
 @each
 def test_bodies_apart(theory):
     found = contact(SURFACE, separation=50.0, theory=theory)
-    ends = get_theory(theory).ends_at_h_max
+    ends = resolve(theory).ends_at_h_max
     assert (found.separation, found.mean_separation) == (50.0, 50.0 if ends else 26.5)
     xr = pytest.importorskip("xarray")
     for name in ("separation", "mean_separation"):

@@ -19,7 +19,7 @@ from mbma_tables import (
     contact_law,
     theories,
 )
-from mbma_tables.theories import THEORIES, GreenwoodWilliamson, Mbma, Persson, get_theory
+from mbma_tables.theories import THEORIES, GreenwoodWilliamson, Mbma, Persson, resolve
 
 SURFACE = Surface(hurst=0.8, q0=0.2, q1=20.0, h_rms=1.5, h_max=4.8)
 STEEP = Surface(hurst=0.35, q0=1.0, q1=1000.0, h_rms=1.0, h_max=3.2)
@@ -81,7 +81,7 @@ def places(law, seed, count=400):
 @pytest.mark.parametrize("rtol", [1e-4, 1e-8])
 def test_within_its_bound_of_the_theory(theory, surface, rtol):
     law = law_of(theory, surface, rtol)
-    chosen = get_theory(theory)
+    chosen = resolve(theory)
     u = places(law, 1)
     true = chosen.answer(surface, u)
     own = np.nan_to_num(true.error).max()
@@ -127,7 +127,7 @@ def test_slopes_and_energy_are_those_of_the_force(theory):
     # over the mean separation, which moves half as far
     u = (law.h_max + d) / 2
     assert law.energy(separation=d) == pytest.approx(
-        MODULUS * get_theory(theory).energy(SURFACE, u), rel=1e-6
+        MODULUS * resolve(theory).energy(SURFACE, u), rel=1e-6
     )
 
 
@@ -240,7 +240,7 @@ def test_mbma_ends_where_its_force_turns():
 
 
 def test_a_users_own_object_is_a_theory():
-    theory = get_theory(Springs())
+    theory = resolve(Springs())
     u = np.array([0.5, 2.0])
     found = theory.answer(SURFACE, u)
     assert found.stiffness == pytest.approx(3 / SURFACE.h_rms * found.pressure, rel=1e-8)
@@ -256,7 +256,7 @@ def test_a_users_own_object_is_a_theory():
 @pytest.mark.parametrize("wrong", ["perssons", 3, None, Springs, object()])
 def test_what_is_no_theory_is_refused(wrong):
     with pytest.raises(InputError, match="theory must be one of"):
-        get_theory(wrong)
+        resolve(wrong)
 
 
 YANG_PERSSON = Surface.named("yang-persson")

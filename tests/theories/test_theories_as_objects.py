@@ -15,7 +15,7 @@ from mbma_tables.theories import (
     Theory,
     TheoryAnswer,
     Variant,
-    get_theory,
+    resolve,
 )
 
 FACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
@@ -31,7 +31,7 @@ OTHERS = [
 
 @pytest.mark.parametrize("make", EACH)
 def test_two_with_the_same_options_are_equal(make):
-    assert make() == make() == get_theory(make.name)
+    assert make() == make() == resolve(make.name)
     assert hash(make()) == hash(make())
     assert repr(make()) == f"{make.__name__}()"
     assert all(make() != other for other in OTHERS)
@@ -77,7 +77,7 @@ class Plain:
 
 @pytest.mark.parametrize("again", [False, True], ids=["itself", "pickled"])
 def test_a_users_object_has_what_a_shipped_theory_has(again):
-    theory = get_theory(Plain())
+    theory = resolve(Plain())
     theory = pickle.loads(pickle.dumps(theory)) if again else theory
     found = contact(FACE, mean_separation=[0.6, 1.5, 5.0], theory=theory)
     assert found.reasons["u is below 1"].tolist() == [True, False, False]

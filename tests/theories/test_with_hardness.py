@@ -8,7 +8,7 @@ import xarray as xr
 from helpers import fresh, random_map
 
 from mbma_tables import Bodies, Surface, contact
-from mbma_tables.theories import THEORIES, BoundaryElements, Simulated, get_theory
+from mbma_tables.theories import THEORIES, BoundaryElements, Simulated, resolve
 from mbma_tables.theories.yielding.theory import Yielding
 
 MAP = 0.1 * random_map(64, 0.05, 0.25, power=0)
@@ -39,7 +39,7 @@ def pairs(tmp_path_factory):
     path = tmp_path_factory.mktemp("table") / "map.nc"
     BoundaryElements.of(measured).to_netcdf(path)
     opened = BoundaryElements.from_netcdf(path)
-    pairs = {name: (get_theory(name), rough) for name in THEORIES}
+    pairs = {name: (resolve(name), rough) for name in THEORIES}
     for grid in ("full", "quick"):
         pairs[grid] = Simulated(grid).of(measured), measured
     return pairs | {"table": (opened, opened.surface)}

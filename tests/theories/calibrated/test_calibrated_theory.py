@@ -30,7 +30,7 @@ from mbma_tables.common.files import shipped_file
 from mbma_tables.surfaces.bearing_curve import QUANTILES
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.theories import Calibrated, Mbma, Persson, get_theory
+from mbma_tables.theories import Calibrated, Mbma, Persson, resolve
 from mbma_tables.theories.calibrated.formulas import (
     CONSTANTS,
     Law,
@@ -192,7 +192,7 @@ class TestScatter:
         assert np.all(found.area_scatter < found.scatter)
         # theories that nothing was fitted for are further off
         for name in ("mbma", "persson", "greenwood_williamson"):
-            other = get_theory(name)
+            other = resolve(name)
             assert other.scatter(SURFACE, "pressure", np.array([0.05])) > found.scatter[1]
             assert (
                 other.scatter(SURFACE, "area", np.array([0.05])) > found.area_scatter[1]

@@ -8,7 +8,7 @@ from helpers import refused, run
 
 from generate.machined.makers import Part, heights
 from mbma_tables import InputError, Surface, contact, contact_law
-from mbma_tables.theories import Simulated, get_theory
+from mbma_tables.theories import Simulated, resolve
 from mbma_tables.theories.simulated.grids import GRIDS
 
 AREAS = [0.01, 0.1, 0.5]
@@ -66,7 +66,7 @@ def test_a_grid_that_is_none_is_refused():
     with pytest.raises(InputError, match="no grid is named 'ful'"):
         Simulated(grid="ful")
     with pytest.raises(InputError, match="needs a height map"):
-        get_theory("simulated")
+        resolve("simulated")
 
 
 def test_a_table_is_of_the_full_grid_alone(tmp_path):
@@ -98,6 +98,6 @@ def test_on_the_command_line(tmp_path):
     assert run(*words, "--theory", "simulated", "--grid", "quick") == quick
     assert "Simulated(grid='full')) was tested from 0.001 on" in quick
     assert "tested from" not in full
-    assert "--grid is of theory 'simulated', not of 'persson'" in refused(
+    assert "grid: options of theory 'simulated' alone, not of 'persson'" in refused(
         *words, "--theory", "persson", "--grid", "full"
     )

@@ -11,7 +11,7 @@ from generate.pages import maps
 from generate.pages.maps import BARS, ratios, read_rows
 from mbma_tables import Bodies, Scene, Surface, contact, contact_law
 from mbma_tables.common.errors import OutOfRangeError
-from mbma_tables.theories import Calibrated, Simulated, theory_name
+from mbma_tables.theories import Calibrated, Simulated, resolve
 from mbma_tables.theories.simulated.own_map import law_loads
 from mbma_tables.theories.simulated.pressing import Press
 
@@ -125,7 +125,7 @@ class TestDefaultTheory:
         assert found.valid.tolist() == [True, False, True, True, False]
         assert contact(surface, separation=2 * float(surface.h_max)).pressure == 0
         assert contact(surface.combined(surface), pressure=0.01).theory == "calibrated"
-        assert theory_name(surface, None, "separation") == "mbma"
+        assert resolve(None, surface, "separation").name == "mbma"
 
     def test_small_unresolved_and_large_ones_and_spectra_are_calibrated(self):
         values = (

@@ -15,7 +15,7 @@ from generate.boundary_elements.surfaces import Recipe, heights
 from generate.calibrated_hardness import BARS, FORMS, OTHERS, blind
 from mbma_tables import Bodies, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.surfaces.bearing_curve import bearing
-from mbma_tables.theories import THEORIES, Mbma, get_theory
+from mbma_tables.theories import THEORIES, Mbma, resolve
 from mbma_tables.theories.evidence import shipped_deviations, shipped_part
 from mbma_tables.theories.simulated.boundary_elements import Contact, project
 from mbma_tables.theories.yielding import formulas as hardness
@@ -151,7 +151,7 @@ def test_many_pressures_on_one_surface(theory, cap):
     if theory == "calibrated":
         # beyond the gaps from which others start
         share = np.append(share, [1e-12, min(0.99, 0.1 / cap)])
-    asked = Yielding(get_theory(theory), cap)
+    asked = Yielding(resolve(theory), cap)
     u = asked.mean_separation_at(SURFACE, "pressure", cap * share)
     found = asked.answer(SURFACE, u)
     # but for the last bits of u
@@ -169,7 +169,7 @@ def test_ten_thousand_contacts_keep_bounds_and_order():
     )
     eta = 10 ** rng.uniform(-4, 2, n) * surface.rms_gradient
     u = surface.h_max * rng.uniform(1e-3, 0.999, n)
-    theory = get_theory("calibrated")
+    theory = resolve("calibrated")
 
     def state(cap, gap):
         found = Yielding(theory, cap).loaded(surface, gap)
@@ -279,11 +279,11 @@ test_what_cannot_be_asked = refusals(
 def test_scatter_of_any_theory():
     area = np.array([0.02, 0.2])
     soft = 0.05 * float(SURFACE.rms_gradient)
-    for theory in map(get_theory, ("mbma", "persson", "greenwood_williamson")):
+    for theory in map(resolve, ("mbma", "persson", "greenwood_williamson")):
         each = (
             theory,
             Yielding(theory, soft),
-            Yielding(get_theory("calibrated"), soft),
+            Yielding(resolve("calibrated"), soft),
             Yielding(theory, 50 * soft),
         )
         known, found, own, hard = (
@@ -342,9 +342,7 @@ def test_hardnesses_of_any_size(theory, cap):
     # of next to none the bearing curve, of a huge one the elastic contact
     u = np.array([0.3, 1.0, 1.5, 2.9 if cap > 1e-310 else 2.0])
     elastic = contact(SURFACE, mean_separation=u, theory=theory)
-    share = hardness.bearing_share(u, 3.0 if get_theory(theory).ends_at_h_max else None)[
-        0
-    ]
+    share = hardness.bearing_share(u, 3.0 if resolve(theory).ends_at_h_max else None)[0]
     pressure, area = (cap * share, share) if cap < 1 else (elastic.pressure, elastic.area)
     for asked in ({"pressure": pressure}, {"mean_separation": u}, {"area": area}):
         found = contact_of(SURFACE, Bodies(hardness=cap), **asked, theory=theory)
@@ -371,7 +369,7 @@ def test_hardnesses_of_any_size(theory, cap):
     ("theory", "most"), [("calibrated", 4), ("mbma", 5), ("greenwood_williamson", 5)]
 )
 def test_a_pressure_takes_few_elastic_answers(monkeypatch, theory, most):
-    kind = type(get_theory(theory))
+    kind = type(resolve(theory))
     asked = []
     original = kind.answer
     monkeypatch.setattr(
