@@ -19,22 +19,15 @@ class LawContact(Contact):
     def of(cls, law: Any, question: Question) -> LawContact:
         """The contact of a law at a gap, a pressure or an area."""
         if question.name == "pressure":
-            values = law.at_pressure(question.value)._asdict()
+            values = law.point_of(question)._asdict()
         else:
-            gap = question.value
-            name = question.name
+            gaps = question
             if not question.is_gap:
-                gap = law.separation(area=gap)
-                name = "separation"
-            d, u = law.both_separations(name, gap)
-            pressure, area, stiffness, _ = law.values(**{name: gap})
-            values = {
-                "separation": d,
-                "mean_separation": u,
-                "area": area,
-                "stiffness": stiffness,
-                "pressure": pressure,
-            }
+                gaps = Question("separation", law.separations_of(question))
+            d, u = law.both_separations(gaps.name, gaps.value)
+            names = ("pressure", "area", "stiffness")
+            values = dict(zip(names, law.values_of(names, gaps), strict=True))
+            values |= {"separation": d[()], "mean_separation": u[()]}
         values["error"] = law.error + 0.0 * values["area"]
         contact = cls(law.setup, values)
         contact.describe({})

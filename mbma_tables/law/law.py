@@ -199,13 +199,13 @@ class ContactLaw(Law, LawQuantities, Displayed):
         """Separations d and mean separations u, of which `gap` is the one named."""
         return both_separations(name, gap, self.h_max, math.isinf(self.highest))
 
-    def _separations(self, question: Question) -> Any:
+    def separations_of(self, question: Question) -> Any:
         """Separations d within the law, at gaps, pressures or areas."""
         if not question.is_gap:
             return self._inverse(question)[0]
         if is_labelled(question.value):
             return apply(
-                lambda block: (self._separations(question.of_block(block)),),
+                lambda block: (self.separations_of(question.of_block(block)),),
                 (question.value,),
                 1,
             )[0]
@@ -241,11 +241,11 @@ class ContactLaw(Law, LawQuantities, Displayed):
             )
         return d
 
-    def _values(self, wanted: tuple[str, ...], question: Question) -> Any:
+    def values_of(self, wanted: tuple[str, ...], question: Question) -> Any:
         """The quantities wanted, in the order of `QUANTITIES`, in one pass."""
         if is_labelled(question.value):
             return apply(
-                lambda block: self._values(wanted, question.of_block(block)),
+                lambda block: self.values_of(wanted, question.of_block(block)),
                 (question.value,),
                 len(wanted),
             )
@@ -254,7 +254,7 @@ class ContactLaw(Law, LawQuantities, Displayed):
             with np.errstate(over="ignore"):
                 d = 2 * question.value - self.h_max
         else:
-            d = self._separations(question) if not question.is_gap else question.value
+            d = self.separations_of(question) if not question.is_gap else question.value
         values, inside = self._filled(wanted, d)
         if question.is_gap and not inside:
             values, _ = self._filled(wanted, self._in_range(question))
@@ -281,7 +281,7 @@ class ContactLaw(Law, LawQuantities, Displayed):
     ) -> Any:
         """Arguments that a method of `Law` does not evaluate itself."""
         question = self._asked(mean_separation, separation, pressure, area)
-        return self._values((QUANTITIES[what],), question)[0]
+        return self.values_of((QUANTITIES[what],), question)[0]
 
     def energy(self, *gaps: Any, **named: Any) -> Numbers:
         """Elastic energy per nominal area, the integral of F/A0 over u to last contact.
@@ -310,7 +310,7 @@ class ContactLaw(Law, LawQuantities, Displayed):
     ) -> tuple[Numbers, Numbers]:
         """F/A0 and -dp/du in one pass, for iterations."""
         question = self._asked(mean_separation, separation, pressure, area)
-        pressures, stiffness = self._values(("pressure", "stiffness"), question)
+        pressures, stiffness = self.values_of(("pressure", "stiffness"), question)
         return pressures, stiffness
 
     def values(
@@ -327,7 +327,7 @@ class ContactLaw(Law, LawQuantities, Displayed):
         """
         question = self._asked(mean_separation, separation, pressure, area)
         return LawValues(
-            *self._values(("pressure", "area", "stiffness", "energy"), question)
+            *self.values_of(("pressure", "area", "stiffness", "energy"), question)
         )
 
     def separation(
@@ -348,7 +348,7 @@ class ContactLaw(Law, LawQuantities, Displayed):
             If the branch does not reach the value; the message has the branch's end.
         """
         question = self._asked(mean_separation, separation, pressure, area)
-        d: Numbers = self._separations(question)
+        d: Numbers = self.separations_of(question)
         return d
 
     def at_pressure(self, pressure: ArrayLike | str) -> LawPoint:
@@ -357,7 +357,10 @@ class ContactLaw(Law, LawQuantities, Displayed):
         With a hardness each of several pressures is reached by first loading from no contact,
         also where they fall: a law does not know of a larger pressure before.
         """
-        question = self._asked(pressure=pressure)
+        return self.point_of(self._asked(pressure=pressure))
+
+    def point_of(self, question: Question) -> LawPoint:
+        """Results where a pressure is given."""
         d, area, stiffness = self._inverse(question, 3)
         mean = d + self.h_max
         mean *= 0.5
@@ -444,7 +447,7 @@ class ContactLaw(Law, LawQuantities, Displayed):
         error of another theory itself.
         """
         question = self._asked(mean_separation, separation, pressure, area)
-        d = np.asarray(self._separations(question))
+        d = np.asarray(self.separations_of(question))
         head = self.block
         words = self.block.view(np.int64)
         x = (self.h_max + np.where(d < 0, head[at.MINUS], head[at.PLUS]) * d) * head[
@@ -570,9 +573,9 @@ class ContactLaw(Law, LawQuantities, Displayed):
         question = self._asked(mean_separation, separation, pressure, area)
         law, factor = self.unloading()
         # the law of the elastic contact has other pressures at this gap
-        d = question.value if question.is_gap else self._separations(question)
+        d = question.value if question.is_gap else self.separations_of(question)
         name = question.name if question.is_gap else "separation"
-        stiffness: Numbers = factor * law._values(("stiffness",), Question(name, d))[0]
+        stiffness: Numbers = factor * law.values_of(("stiffness",), Question(name, d))[0]
         return stiffness
 
     def unloading(self) -> tuple[ContactLaw, float]:

@@ -401,7 +401,7 @@ class _Planner:
         }
         parts = frozenset(part for part, is_needed in requirements.items() if is_needed)
         reasons = ", ".join(why)
-        if self.problem.theory == "mbma":
+        if self.problem.sums_islands:
             return self.contact_of_mbma(reasons, parts)
         return self.contact_of_another(reasons, parts)
 

@@ -21,6 +21,7 @@ from mbma_tables.common.units import Units, modulus_and_units, require_surface
 from mbma_tables.materials import hardness_in
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import OF_MAPS, THEORIES, default_name, resolve
+from mbma_tables.theories.base import Theory
 from mbma_tables.theories.mbma.island_models import ISLAND_MODELS, AnyModel
 from mbma_tables.theories.mbma.variants import Variant, get_variant
 
@@ -99,6 +100,7 @@ class Problem:
         self._set_numbers()
         if self.theory is None:
             vars(self).update(theory=self._default_theory())
+        self._take_options_of_theory()
         self._set_tolerance()
         whole_number_in("points", self.points, 2, 10_000)
         vars(self).update(
@@ -130,11 +132,28 @@ class Problem:
         given_name = "separation" if self.separations is not None else None
         return default_name(self.surface, given_name)
 
+    def _take_options_of_theory(self) -> None:
+        """Take options of MBMA as an object for those of the scene, whose steps choose the others."""
+        if (
+            not isinstance(self.theory, Theory)
+            or "island_model" not in self.theory.options
+        ):
+            return
+        for name, value in self.theory.changed_options.items():
+            if name == "outside":
+                raise InputError(
+                    "outside: a scene solves the islands that no table covers: leave it out"
+                )
+            if getattr(self, name) not in (None, "reported"):
+                raise InputError(
+                    f"{name} is given by the scene and by its theory: give one of them"
+                )
+            vars(self)[name] = value
+        vars(self).update(theory=self.theory.name)
+
     def _set_tolerance(self) -> None:
         """Set `rtol`: as given, by default, or None where a time budget is given."""
-        rtol: float | None = (
-            DEFAULT_RTOL if self.theory == "mbma" else DEFAULT_RTOL_OF_OTHERS
-        )
+        rtol: float | None = DEFAULT_RTOL if self.sums_islands else DEFAULT_RTOL_OF_OTHERS
         if self.rtol is not None:
             rtol = number_in("rtol", self.rtol, MIN_RTOL, MAX_RTOL)
         if self.seconds is not None:
@@ -259,7 +278,7 @@ class Problem:
 
     def _check_options_of_mbma(self) -> None:
         """Raise an error for options and effects that other theories do not have."""
-        if self.theory == "mbma":
+        if self.sums_islands:
             return
         options = []
         if self.island_model is not None:
@@ -272,6 +291,11 @@ class Problem:
         if options:
             not_of = f"of theory 'mbma', not of {self.theory_name!r}"
             raise InputError(f"{' and '.join(options)}: {not_of}: leave out")
+
+    @property
+    def sums_islands(self) -> bool:
+        """Whether the scene's theory is MBMA, whose islands and refinements a plan chooses."""
+        return bool(self.theory == "mbma")
 
     @property
     def theory_name(self) -> str:

@@ -26,6 +26,7 @@ from mbma_tables.scenes.problem import INVERTED, OF_CONTACT, Problem
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.theories import resolve
 from mbma_tables.theories.mbma.island_models import RigidModel, answer_islands
 from mbma_tables.theories.mbma.tables import get_model
 from mbma_tables.theories.mbma.variants import get_variant
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
 
     from mbma_tables.contacts.result import Contact
     from mbma_tables.theories.mbma.profile import Shape
-    from mbma_tables.theories.mbma.theory import Mbma
 
 VALIDITY = (
     "valid",
@@ -77,12 +77,14 @@ def _contact(run: Run, step: Step) -> None:
 
     problem = run.problem
     theory = problem.theory
-    if theory == "mbma":
-        from mbma_tables.theories.mbma.theory import Mbma
-
-        assert step.island_model is not None
-        assert step.rtol is not None
-        theory = Mbma(step.island_model, problem.variant, step.rtol, _outside(step))
+    if problem.sums_islands:
+        options = {
+            "island_model": step.island_model,
+            "variant": problem.variant,
+            "rtol": step.rtol,
+            "outside": _outside(step),
+        }
+        theory = resolve(theory, options=options)
     assert problem.prescribed is not None
     # without its end the surface is a higher one, whose mean gaps are others than the scene's
     if "finite_height" in problem.dropped:
@@ -97,7 +99,7 @@ def _contact(run: Run, step: Step) -> None:
         run.gap = pressed.separation
     _keep_quantities(run, pressed)
     error = float(pressed.error.max())
-    if problem.theory == "mbma" and problem.hardness is None:
+    if problem.sums_islands and problem.hardness is None:
         error *= _amplification(run, theory)
     run.errors[step.name] = error
 
@@ -139,7 +141,7 @@ def _outside(step: Step) -> str:
     return "exact" if step.island_model_name in TABLES else "raise"
 
 
-def _amplification(run: Run, theory: Mbma) -> float:
+def _amplification(run: Run, theory: Any) -> float:
     """Largest ratio of the errors of the requested quantities to that of force and area."""
     problem = run.problem
     h_max = float(run.surface.h_max)
@@ -302,7 +304,6 @@ def other_theory(
     hardness: float = math.inf,
 ) -> Curve:
     """A theory, given as for `contact`, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
-    from mbma_tables.theories import resolve
     from mbma_tables.theories.users import answer_where_finite
 
     chosen = resolve(theory, surface)
@@ -468,7 +469,7 @@ def _attributes(run: Run, plan: Plan) -> dict[str, str | float]:
         "error": max(run.errors.values(), default=0.0),
         "errors": json.dumps(run.errors),
         "theory": problem.theory_name,
-        "variant": get_variant(problem.variant).name if problem.theory == "mbma" else "",
+        "variant": get_variant(problem.variant).name if problem.sums_islands else "",
         "island_models": json.dumps(island_models),
         "switched_off": " ".join(sorted(problem.dropped)),
         "E_star": float(problem.E_star),

@@ -119,6 +119,10 @@ def resolve(
         raise InputError(
             f"{', '.join(options)}: options of a theory given by its name, got {chosen!r}"
         )
+    from mbma_tables.theories.base import Theory
+
+    if isinstance(chosen, Theory) and chosen.elastic is chosen:
+        return chosen
     return _of_object(chosen, surface)
 
 
@@ -129,22 +133,18 @@ def _shipped(name: str) -> Any:
 
 
 def _of_object(chosen: Any, surface: Any) -> Theory:
-    """A theory as an object of this package."""
+    """A simulation of a surface's map or a user's object as a theory; other objects are refused."""
     from mbma_tables.theories.base import Theory, UserTheory
-
-    if isinstance(chosen, Theory):
-        if chosen.elastic is not chosen:
-            raise InputError(
-                f"theory {chosen.name!r} is one with a hardness: a hardness is of the bodies, "
-                "Bodies(..., hardness=...), beside the elastic theory"
-            )
-        return chosen
-
     from mbma_tables.theories.simulated.theory import Simulated
     from mbma_tables.theories.users import Wrapped
 
     if isinstance(chosen, Simulated):
         return chosen.of(surface)
+    if isinstance(chosen, Theory):
+        raise InputError(
+            f"theory {chosen.name!r} is one with a hardness: a hardness is of the bodies, "
+            "Bodies(..., hardness=...), beside the elastic theory"
+        )
     if isinstance(chosen, UserTheory) and not isinstance(chosen, type):
         return Wrapped(chosen)
     raise InputError(

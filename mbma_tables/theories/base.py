@@ -24,6 +24,7 @@ from mbma_tables.common.arguments import (
     spread,
 )
 from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
+from mbma_tables.common.shared import frozen
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import inversion, tested
 from mbma_tables.theories.evidence import shipped_deviations
@@ -31,6 +32,10 @@ from mbma_tables.theories.inversion import FEW_LOOKS, LOOKS, Curve, Indices
 
 PACKAGE = "mbma_tables."
 ROUNDING = 4 * float(np.finfo(float).eps)  # relative, of gaps beside the ends of a domain
+
+
+# the domain of theories that answer at every mean separation, which broadcasts
+EVERYWHERE = frozen((np.asarray(0.0), np.asarray(np.inf)))
 
 
 class TheoryAnswer(NamedTuple):
@@ -137,18 +142,24 @@ class Theory(abc.ABC):
             field.name: getattr(self, field.name) for field in dataclasses.fields(self)
         }
 
-    def __repr__(self) -> str:
-        if not dataclasses.is_dataclass(self):
-            return super().__repr__()
+    @property
+    def changed_options(self) -> dict[str, Any]:
+        """Those that differ from their defaults."""
         try:
             by_default = type(self)().options
         except TypeError:  # some options have no default
             by_default = {}
-        changed = []
-        for name, value in self.options.items():
-            if name not in by_default or np.any(value != by_default[name]):
-                changed.append(f"{name}={value!r}")
-        return f"{type(self).__name__}({', '.join(changed)})"
+        return {
+            name: value
+            for name, value in self.options.items()
+            if name not in by_default or np.any(value != by_default[name])
+        }
+
+    def __repr__(self) -> str:
+        if not dataclasses.is_dataclass(self):
+            return super().__repr__()
+        texts = [f"{name}={value!r}" for name, value in self.changed_options.items()]
+        return f"{type(self).__name__}({', '.join(texts)})"
 
     def __getstate__(self) -> dict[str, Any]:
         # without what was computed from the options
@@ -480,7 +491,7 @@ def require_domain(
     slack = ROUNDING * np.asarray(surface.h_max)
     above = mean_separation >= low - slack
     below = mean_separation <= high + slack
-    if np.all(above) and np.all(below):
+    if (above & below).all():
         return
     for inside, end, meaning in ((above, low, "at least"), (below, high, "at most")):
         ends = describe_entries(np.broadcast_to(end, np.shape(inside)), ~inside)

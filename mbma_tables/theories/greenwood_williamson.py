@@ -8,7 +8,7 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories.base import Theory, TheoryAnswer
+from mbma_tables.theories.base import EVERYWHERE, Theory, TheoryAnswer
 from mbma_tables.theories.mbma.greenwood_tripp import height_integral
 
 EPSILON = 1e-13  # accuracy of the height integrals
@@ -62,8 +62,7 @@ class GreenwoodWilliamson(Theory):
 
     def domain(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
         """All mean separations from 0; the force of wide gaps underflows to zero."""
-        low = np.zeros(surface.shape)
-        return low, np.full_like(low, np.inf)
+        return EVERYWHERE
 
     def reasons(
         self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray

@@ -8,7 +8,7 @@ from helpers import Springs, contact_of, refusals
 
 from mbma_tables import Bodies, InputError, Scene, Surface, contact
 from mbma_tables.bodies import mean_conductivity
-from mbma_tables.theories import THEORIES
+from mbma_tables.theories import THEORIES, Mbma
 
 CONCRETE = Surface.named("concrete")
 MODULUS = 13.3
@@ -266,3 +266,29 @@ def test_a_plan_of_mbma_that_yields_keeps_the_tolerance():
             match=f"the cost of theory '{name}' is not known: give rtol instead of seconds",
         ):
             Scene(**unknown, seconds=10.0).plan()
+
+
+def test_options_of_mbma_as_an_object_are_those_of_the_scene():
+    asked = {"separations": [0.5, 0.7], "without": ["subscale_area"]}
+    options = {"island_model": "exact", "variant": "printed", "rtol": 1e-4}
+    named = Scene(CONCRETE, theory="mbma", **options, **asked).run()
+    for scene in (
+        Scene(CONCRETE, theory=Mbma(**options), **asked),
+        Scene(
+            CONCRETE,
+            theory=Mbma(variant="printed"),
+            **asked,
+            rtol=1e-4,
+            island_model="exact",
+        ),
+    ):
+        found = scene.run()
+        for name in ("theory", "variant", "rtol"):
+            assert found.attrs[name] == named.attrs[name]
+        np.testing.assert_array_equal(found["pressure"], named["pressure"])
+    for given, said in (
+        ({"theory": Mbma(rtol=1e-4), "rtol": 1e-6}, "rtol is given by the scene and by"),
+        ({"theory": Mbma(outside="nan")}, "outside: a scene solves"),
+    ):
+        with pytest.raises(InputError, match=said):
+            Scene(CONCRETE, **asked, **given)

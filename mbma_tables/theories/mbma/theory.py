@@ -14,6 +14,7 @@ from mbma_tables.common.shared import shared_property
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories.base import (
+    EVERYWHERE,
     Compression,
     Solved,
     Theory,
@@ -241,8 +242,7 @@ class Mbma(Theory):
 
         Where islands lie outside their table, `outside` says what happens.
         """
-        low = np.zeros(surface.shape)
-        return low, np.full_like(low, np.inf)
+        return EVERYWHERE
 
     def softening(self, surface: AnySurface) -> FloatArray:
         """Mean separation [length] below which stiffness falls with compression.
