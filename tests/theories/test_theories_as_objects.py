@@ -115,7 +115,7 @@ class Short:
 @pytest.mark.parametrize(
     ("theory", "said"),
     [
-        (Pair(), r"must answer a TheoryAnswer\(pressure, area, stiffness, error\)"),
+        (Pair(), "'pair', a Theory, must answer a TheoryAnswer of"),
         (Triple(), "'triple' must answer F/"),
         (Short(), "'short' must answer F/"),
     ],
