@@ -39,7 +39,7 @@ from mbma_tables.contacts.sensitivity import (
 )
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import law_of
-from mbma_tables.materials import Pair, effective_modulus
+from mbma_tables.materials import Pair, effective_modulus, tangential_ratio
 from mbma_tables.quantities.interface import Gas, Interface
 from mbma_tables.quantities.properties import JointQuantities
 from mbma_tables.quantities.tangential import (
@@ -239,6 +239,8 @@ class Joint(JointQuantities, Displayed):
         checked_friction(self.friction)
         checked_direction(self.direction, self.surface)
         self._in_units.require_one_conductivity()
+        if self.bodies.nu is not None:
+            one_number("nu", tangential_ratio(self.bodies.nu, self.bodies.E))
         if isinstance(self.theory, str):
             require_name("theory", self.theory, (*THEORIES, *OF_MAPS))
             surface: Any = self.surface

@@ -577,16 +577,6 @@ def hardness_in(units: Units, value: Any) -> Any:
     return units.number("hardness", hardness(value) if isinstance(value, str) else value)
 
 
-def bodies(materials: Any, E_star: Any, hardness: Any) -> tuple[Any, Any, Pair | None]:
-    """Modulus and hardness of a contact, by arguments or materials, and these materials."""
-    if materials is None:
-        return E_star, hardness, None
-    metals = pair(materials)
-    if not (isinstance(E_star, int | float) and E_star == 1.0):
-        raise InputError("E_star and materials are both given: give one of them")
-    return metals.E_star, metals.hardness if hardness is None else hardness, metals
-
-
 def tangential_ratio(
     nu: ArrayLike,
     E: Sequence[Any] | None = None,

@@ -658,6 +658,7 @@ def test_metals_whose_names_begin_with_a_digit(typed, name):
         ({"bodies": {"E_star": 1, "hardnes": 2}}, "did you mean 'hardness'"),
         ({"bodies": "42CrMo5"}, "no known unit of stress"),
         ({"bodies": True}, "real numbers"),
+        ({"bodies": Bodies(58.0, nu=[0.1, 0.2, 0.3])}, "nu must be one number"),
         ({"bodies": Bodies(58.0, hardness=[1.0, 2.0])}, "hardness must be one number"),
         (
             {"bodies": Bodies(58.0, conductivity=np.array([1.0, 2.0]))},

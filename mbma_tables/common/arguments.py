@@ -148,8 +148,8 @@ def is_labelled(value: Any) -> bool:
 
 
 def detached(value: Any) -> Any:
-    """A copy of an array, a DataArray or a list, which its owner may go on changing; other values as they are."""
-    if isinstance(value, np.ndarray | list) or is_labelled(value):
+    """A copy of an array of any kind or a list, which its owner may go on changing; other values as they are."""
+    if isinstance(value, list) or hasattr(value, "__array__"):
         return copy.deepcopy(value)
     return value
 

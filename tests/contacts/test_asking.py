@@ -11,6 +11,7 @@ import dask
 import dask.array
 import netCDF4
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from dask.callbacks import Callback
@@ -647,8 +648,13 @@ def test_what_was_given_may_be_changed_afterwards():
     pressures = law.pressure(gaps)
     before = pressures.copy()
     of_law = law.at(gaps), law.at(pressure=pressures)
-    for array in (gaps, moduli, caps, named, pressures):
+    series = pd.Series([100.0, 200.0])
+    of_series = Bodies(series, hardness=series)
+    for array in (gaps, moduli, caps, named, pressures, series):
         array[:] = 1.0
+    assert repr(Bodies(np.float64(58.0)).E_star) == repr(np.float64(58.0))
+    np.testing.assert_array_equal(of_series.E_star, [100.0, 200.0])
+    np.testing.assert_array_equal(of_series.hardness, [100.0, 200.0])
     np.testing.assert_array_equal(pressed.mean_separation, [1.9, 2.0])
     np.testing.assert_array_equal(of_named.mean_separation, [1.9, 2.0])
     np.testing.assert_array_equal(bodies.E_star, [100.0, 200.0])
