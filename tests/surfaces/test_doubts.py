@@ -14,7 +14,7 @@ from generate.machined.artefacts import (
     step,
     with_artefact,
 )
-from generate.machined.makers import FAMILIES, Part, finished, heights
+from generate.machined.makers import FAMILIES, Part, finished, heights, rough
 from mbma_tables import OutOfRangeError, Surface, contact
 from mbma_tables.surfaces.averages import average
 from mbma_tables.theories import Simulated
@@ -106,6 +106,14 @@ class TestSharpPlaces:
         assert opened(clean).doubts == ()
         assert opened(values).doubts
 
+    @pytest.mark.parametrize("side", [2, 3])
+    @pytest.mark.parametrize("hurst", [0.4, 0.6, 0.8, 1.0])
+    def test_clusters_on_waves_down_to_the_sampling_step(self, side, hurst):
+        clean = rough(np.random.default_rng(3), 128, 16, 2.0, hurst)
+        dust = squares(side, 6e-3, 8.0).plant(np.random.default_rng(4), clean.shape)
+        assert opened(clean).doubts == ()
+        assert opened(clean + clean.std() * dust).doubts
+
     @pytest.mark.parametrize(
         "artefact", [squares(1, 1e-3, 8.0), squares(3, 1e-3, 8.0), step(20.0, 1.5)]
     )
@@ -196,6 +204,9 @@ def test_a_spectrum_without_its_convention_is_not_valid():
     assert remedies == ["paper", "isotropic"]
     for remedy in remedies:
         named = Surface.from_spectrum(**given, convention=remedy)
+        # with a highest point as of tested surfaces
+        high = given | {"h_max": 4 * float(named.h_rms)}
+        named = Surface.from_spectrum(**high, convention=remedy)
         assert contact(named, area=0.05, theory="calibrated").valid
 
 
