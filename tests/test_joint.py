@@ -676,3 +676,29 @@ def test_odd_bodies_and_gases_of_a_joint_are_refused(changed, match):
     described = {"part_a": FACE, "bodies": METALS, "nominal_area": "4 cm^2"}
     with pytest.raises(InputError, match=match):
         Joint(**described | changed)
+
+
+def test_the_command_has_reasons_and_says_how_pressures_are_reached():
+    """JSON had the entries that are not valid without reasons, and neither said "first loading"."""
+    content = json.loads(run("joint", EXAMPLE, "-p", "50MPa,1e-5MPa", "--json"))
+    assert content["columns"]["valid"] == ["yes", "no"]
+    found = Joint.from_toml(EXAMPLE).at_pressure(["50 MPa", "1e-5 MPa"])
+    assert content["valid"] == found.valid.tolist() == [True, False]
+    assert content["reasons"] == {reason: [1] for reason in found.reasons}
+    assert content["loading"] == found.loading
+    output = run("joint", EXAMPLE, "-p", "50MPa,1e-5MPa")
+    assert f"loading: {found.loading}" in output.splitlines()
+    assert "first; each pressure is reached from no contact" in found.loading
+
+
+def test_falling_pressures_are_told_not_to_be_unloading(joint):
+    rising = joint.at_pressure(["1 MPa", "10 MPa"]).loading
+    falling = joint.at_pressure(["10 MPa", "1 MPa"]).loading
+    assert falling.startswith(rising)
+    assert "no unloading" in falling
+    assert "unloading" not in rising
+    assert joint.at_pressure("10 MPa").loading == rising
+    elastic = Joint(joint.surface, bodies=Bodies("100 GPa"), theory="calibrated")
+    assert elastic.at_pressure(["10 MPa", "1 MPa"]).loading == ""
+    assert "loading" not in elastic.table(["10 MPa"]).attrs
+    assert joint.table(["10 MPa"]).attrs["loading"] == rising

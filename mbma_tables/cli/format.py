@@ -38,6 +38,9 @@ SCATTER = {
     "stiffness_scatter": "ln stiffness",
     "unloading_stiffness_scatter": "ln unloading stiffness",
     "separation_scatter": "u",
+    "total_conductance_scatter": "ln total conductance",
+    "solid_conductance_scatter": "ln solid conductance",
+    "gas_conductance_scatter": "ln gas conductance",
 }
 SURFACE_NUMBERS = (
     "hurst",
@@ -223,32 +226,44 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
     return facts, notes
 
 
-def _validity(answer: Contact, yields: bool) -> tuple[list[str], dict[str, Any]]:
-    """Range in which a contact's theory was tested, and its scatter: lines of text, and machine-readable facts."""
+def validity_of(answer: Contact) -> tuple[list[str], dict[str, Any]]:
+    """Where contacts are not valid and why, and how they are loaded: lines of text, and machine-readable facts."""
     valid = np.atleast_1d(answer.valid)
-    notes = []
     reasons = {
         reason: np.flatnonzero(mask).tolist() for reason, mask in answer.reasons.items()
     }
+    notes = []
     if reasons:
         listed = "; ".join(
             f"{reason} ({len(places)})" for reason, places in reasons.items()
         )
         notes.append(f"not valid at {int((~valid).sum())} of {valid.size}: {listed}")
-    scatter = {name: getattr(answer, name) for name in SCATTER}
-    # of an elastic contact both stiffnesses are one
-    listed_names = [
-        name for name in SCATTER if yields or name != "unloading_stiffness_scatter"
-    ]
-    meanings = ", ".join(SCATTER[name] for name in listed_names)
-    ranges = ", ".join(shown(scatter[name], answer.units[name]) for name in listed_names)
-    if np.isfinite([*scatter.values()]).any():
-        notes.append(f"scatter of {meanings}: {ranges}")
+    if answer.loading:
+        notes.append(f"loading: {answer.loading}")
     return notes, {
         "valid": valid.tolist(),
         "reasons": reasons,
-        **{n: np.ravel(v).tolist() for n, v in scatter.items()},
+        "loading": answer.loading or None,
     }
+
+
+def _scatter(answer: Contact) -> tuple[list[str], dict[str, Any]]:
+    """Model uncertainties of a contact, likewise."""
+    scatter = {
+        name: answer.quantity(name)
+        for name in SCATTER
+        if registry()[name].is_available(answer)
+    }
+    # of an elastic contact both stiffnesses are one
+    listed_names = [
+        name for name in scatter if answer.yields or name != "unloading_stiffness_scatter"
+    ]
+    meanings = ", ".join(SCATTER[name] for name in listed_names)
+    ranges = ", ".join(shown(scatter[name], answer.units[name]) for name in listed_names)
+    notes = []
+    if any(np.isfinite(values).any() for values in scatter.values()):
+        notes.append(f"scatter of {meanings}: {ranges}")
+    return notes, {name: np.ravel(values).tolist() for name, values in scatter.items()}
 
 
 def report_answer(
@@ -291,8 +306,8 @@ def report_answer(
             notes[-1] = (
                 f"hardness {model.hardness}: psi {answer.psi:.3g}, elastic up to {ELASTIC_PSI:g} (from {limit} on)"
             )
-        told, validity = _validity(answer, model.yields)
-        notes = notes + told
-        facts = facts | validity
+        for lines, more in (validity_of(answer), _scatter(answer)):
+            notes = notes + lines
+            facts = facts | more
     own = {name: shown_unit(name, specimen.units) for name in values if name not in units}
     return Report(command, specimen.title, notes, facts, values, own | dict(units))

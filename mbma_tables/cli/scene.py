@@ -8,10 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from mbma_tables.cli.export import write_first
-from mbma_tables.cli.format import Report, assumption_notes, columns_of, to_json
+from mbma_tables.cli.format import (
+    Report,
+    assumption_notes,
+    columns_of,
+    to_json,
+    validity_of,
+)
 from mbma_tables.cli.options import (
     Output,
     check_plot,
@@ -220,14 +225,19 @@ def joint_command(
     joint = Joint.from_toml(file)
     found = joint.at_pressure(pressure or [joint.pressure_of(each) for each in force])
     values, units = columns_of(found, uncertainties=True)
-    facts = joint.facts_of(found)
+    facts = joint.facts() | {"theory": found.theory}
     # a line for each assumption, as of other commands
     assumed = assumptions(joint.surface)
     notes = [f"{name}: {text}" for name, text in facts.items() if name != "assumed"]
     notes += assumption_notes(assumed)
-    for reason, mask in found.reasons.items():
-        notes.append(f"not valid at {int(np.sum(mask))} of {np.size(mask)}: {reason}")
+    lines, validity = validity_of(found)
+    notes += lines
     picture = b"" if plot is None else to_picture(joint.plot(), plot.suffix[1:])
-    Report("joint", file.name, notes, {**facts, "assumed": assumed}, values, units).write(
-        output, plot, picture
-    )
+    Report(
+        "joint",
+        file.name,
+        notes,
+        {**facts, "assumed": assumed, **validity},
+        values,
+        units,
+    ).write(output, plot, picture)

@@ -12,7 +12,8 @@ def visible(text: str, keep: str = "") -> str:
     >>> visible("a\x1b[2Jb\nµ")
     'a\\x1b[2Jb\\nµ'
     """
-    if text.isprintable():
+    # tables of many lines are printable but for their line ends
+    if all(letter in keep for letter in set(text) if not letter.isprintable()):
         return text
     escaped = []
     for letter in text:

@@ -586,3 +586,18 @@ def test_leakage_is_a_column_where_it_is_asked_for():
         "columns"
     ]
     assert (np.diff(curve["leakage"]) < 0).all()
+
+
+def test_contacts_that_yield_say_how_they_are_loaded():
+    words = ["contact", "--surface", "challenge", "--E-star", "25MPa"]
+    words += ["--length-unit", "mm", "-p", "200kPa,100kPa", "--json"]
+    for hardness, expected in ((["--hardness", "5MPa"], True), ([], False)):
+        report = json.loads(CliRunner().invoke(main, words + hardness).output)
+        assert bool(report["loading"]) == expected
+        text = CliRunner().invoke(main, words[:-1] + hardness).output
+        assert (f"loading: {report['loading']}" in text) == expected
+    assert (
+        CliRunner()
+        .invoke(main, [*words[:-1], "--hardness", "5MPa"])
+        .output.count("no unloading")
+    )
