@@ -280,6 +280,11 @@ _SPECIMEN_OPTIONS = (
         "or the nominal area [length^2], which determines the highest point.",
     ),
     _option(
+        "process",
+        "What made the face, such as milled: whether results are valid depends on it.",
+        metavar="NAME",
+    ),
+    _option(
         "E_star",
         "Effective modulus; export needs one, elsewhere forces are over E* without it.",
     ),

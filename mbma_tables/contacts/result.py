@@ -42,6 +42,7 @@ from mbma_tables.quantities.validity import (
     valid_where_none,
 )
 from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
+from mbma_tables.surfaces.surface import assumptions
 from mbma_tables.theories.base import Theory, TheoryAnswer
 
 if TYPE_CHECKING:
@@ -467,10 +468,12 @@ class Contact(State, Displayed):
     _variables = variables
 
     def _origin(self) -> dict[str, str]:
-        return {
+        origin = {
             "E_star": shown(self.E_star, self.units["pressure"]),
             "surface": repr(self.surface),
         }
+        assumed = assumptions(self.surface)
+        return origin | ({"assumed": "; ".join(assumed)} if assumed else {})
 
     def _figure(self) -> Any:
         unit = self.units["pressure"]

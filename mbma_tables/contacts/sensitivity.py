@@ -408,7 +408,9 @@ def _of_drawing(surface: Any, unit: str | None) -> Unknowns | None:
         for name in numbers:
             power = DIMENSIONS.get(name, (0, 0))[0]
             numbers[name] *= factor(surface.unit, unit, power=power)
-    make = functools.partial(Surface.from_roughness, unit=unit or surface.unit)
+    make = functools.partial(
+        Surface.from_roughness, unit=unit or surface.unit, process=record.get("process")
+    )
     return Unknowns(numbers, make, batches=isinstance(surface, Surface))
 
 

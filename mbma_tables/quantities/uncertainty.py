@@ -49,7 +49,7 @@ def area_scatter(contact: State) -> Any:
 def stiffness_scatter(contact: State) -> Any:
     """Model uncertainty, one standard deviation of ln `stiffness` at this pressure.
 
-    NaN where a hardness is given: the slope of the loading curve of contacts that yield was
+    NaN where a hardness is given that anything reaches: the slope of the loading curve of contacts that yield was
     not compared with simulations; `unloading_stiffness_scatter` is that of their unloading
     stiffness.
     """

@@ -7,6 +7,7 @@ Everything else that is assumed follows from Gaussian heights.
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -21,8 +22,11 @@ from mbma_tables.common.arguments import (
     finite_array,
     positive_array,
     require,
+    require_name,
 )
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.files import shipped_file
+from mbma_tables.common.shared import shared
 from mbma_tables.common.units import resolve
 from mbma_tables.surfaces import spectrum
 
@@ -30,7 +34,7 @@ HEIGHTS = ("Rq", "Ra", "Sq", "Sa")
 SLOPES = ("Rdq", "Sdq", "Rsm")
 WAVES = ("longest", "shortest")
 TOPS = ("h_max", "Sp", "nominal_area")
-ROUGHNESS = (*HEIGHTS, *SLOPES, *WAVES, "rolloff", *TOPS[1:])
+ROUGHNESS = (*HEIGHTS, *SLOPES, *WAVES, "rolloff", *TOPS[1:], "process")
 ASSUMED = (
     "heights are Gaussian and the surface is isotropic: measure a map of a ground, milled "
     "or worn face"
@@ -94,8 +98,43 @@ def _one_of(names: tuple[str, ...], numbers: Mapping[str, Any], what: str) -> st
     return several[0] if several else ""
 
 
-def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[str, Any]:
+@shared()
+def processes() -> dict[str, dict[str, str]]:
+    """What is known of faces by the process that made them, a row of the shipped file each."""
+    with open(shipped_file("processes.csv"), encoding="utf-8", newline="") as file:
+        lines = (line for line in file if not line.startswith("#"))
+        return {row["process"]: row for row in csv.DictReader(lines)}
+
+
+def record_of_process(process: Any) -> dict[str, str]:
+    """Entries of a surface's record: the process, and why a theory is not valid for it."""
+    if process is None:
+        return {}
+    require_name("process", process, processes())
+    row = processes()[process]
+    record = {"process": process}
+    if float(row["valid"]) > 0:
+        return record
+    if int(row["maps"]):
+        factor = math.exp(float(row["stiffness_error"]))
+        compared = (
+            f"the calibrated law is valid for none of {row['maps']} maps of {process} faces; of one "
+            f"contact in ten its stiffness is wrong by a factor of {factor:.2f} or more"
+        )
+    else:
+        compared = f"no map of {process} faces was compared with simulations"
+    record["not_valid"] = (
+        f"the face is {process}, not Gaussian and isotropic: {compared}; "
+        "contact(Surface.from_map(...), theory='simulated') answers for a measured one"
+    )
+    return record
+
+
+def surface_of_roughness(
+    unit: str | None, numbers: Mapping[str, Any], process: Any = None
+) -> dict[str, Any]:
     """Arguments of `Surface` from numbers of a drawing; see `Surface.from_roughness`."""
+    of_process = record_of_process(process)
     stated = {name: value for name, value in numbers.items() if value is not None}
     stated, unit = resolve(stated, unit)
     height = _one_of(HEIGHTS, stated, "the height of roughness")
@@ -133,6 +172,7 @@ def surface_of_roughness(unit: str | None, numbers: Mapping[str, Any]) -> dict[s
         "given": {name: _plain(stated[name]) for name in used},
         "unit": unit,
         "assumed": [ASSUMED, *(SAID[name] for name in used)],
+        **of_process,
     }
     surface: dict[str, Any] = {
         "hurst": at["hurst"],

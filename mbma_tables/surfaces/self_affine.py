@@ -247,6 +247,7 @@ class SelfAffine(AnySurface):
         shortest: Any = None,
         rolloff: Any = None,
         nominal_area: Any = None,
+        process: str | None = None,
         unit: str | None = None,
     ) -> Any:
         """A surface from the roughness parameters of a drawing or a profilometer.
@@ -270,6 +271,12 @@ class SelfAffine(AnySurface):
         rolloff : float or str, optional
             Longest wavelength of the power law [length]; between `longest` and it the
             spectrum is flat, as for most machined faces. Default: `longest`.
+        process : str, optional
+            What made the face: "gaussian", "turned", "milled", "ground", "honed", "lapped",
+            "worn", "sprayed", "pitted", "etched", "eroded", "patchy", "dimpled", "blasted"
+            or "polished". It changes no mean result. Without it the face is assumed to be
+            Gaussian and isotropic, as the tested ones were; of the others, all but
+            "gaussian", no contact is `valid`, and no model uncertainty is stated.
 
         Returns
         -------
@@ -279,7 +286,8 @@ class SelfAffine(AnySurface):
         Raises
         ------
         InputError, OutOfRangeError
-            For too few or too many numbers, and for those that no band with 3 < q1/q0 <= 1e8 has.
+            For too few or too many numbers, for those that no band with 3 < q1/q0 <= 1e8 has,
+            and for an unknown process.
 
         Examples
         --------
@@ -294,9 +302,11 @@ class SelfAffine(AnySurface):
         'h_rms = sqrt(pi/2) Ra: heights are Gaussian; the profile is long and unfiltered'
         """
         roughness_parameters = {
-            name: value for name, value in locals().items() if name not in ("cls", "unit")
+            name: value
+            for name, value in locals().items()
+            if name not in ("cls", "unit", "process")
         }
-        numbers = surface_of_roughness(unit, roughness_parameters)
+        numbers = surface_of_roughness(unit, roughness_parameters, process)
         return cls.spectral(**numbers) if "C" in numbers else cls(**numbers)
 
     @classmethod
@@ -352,8 +362,15 @@ class SelfAffine(AnySurface):
         )
 
     def with_numbers(self, *numbers: Any) -> Self:
-        """Another surface, in the same unit; the records of one surface go with it."""
-        records = self.provenance if not self.labelled and self.shape == () else ()
+        """Another surface, in the same unit.
+
+        The records of one surface go with it, of a batch those that doubt it.
+        """
+        records: tuple[Mapping[str, Any], ...] = self.provenance
+        if self.labelled or self.shape != ():
+            records = tuple(
+                {"step": "doubt", "not_valid": doubt} for doubt in self.doubts
+            )
         return type(self)(*numbers, unit=self.unit, provenance=records)
 
     def power_spectrum(self, q: ArrayLike) -> Any:

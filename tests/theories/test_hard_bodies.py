@@ -97,3 +97,27 @@ def test_where_valid_unloading_is_as_stiff_as_loading(theory):
             assert ratio[pressed.valid].min() > 0.95
             if theory != "greenwood_williamson":
                 assert pressed.valid.any()
+
+
+@pytest.mark.parametrize("theory", ["calibrated", "persson"])
+def test_the_slope_of_loading_is_as_certain_as_the_elastic_one_where_nothing_yields(
+    theory,
+):
+    surface = Surface(hurst=0.8, q0=1 / 32, q1=1.0, h_rms=1.0, h_max=4.0)
+    area = np.array([0.003, 0.03, 0.3, 0.9])
+    elastic = contact(surface, area=area, theory=theory)
+    for eta, is_elastic in ((0.9, False), (4.0, True), (1e12, True)):
+        hard = contact(
+            surface,
+            Bodies(hardness=eta * surface.rms_gradient),
+            pressure=elastic.pressure,
+            theory=theory,
+        )
+        if not is_elastic:
+            assert np.isnan(hard.stiffness_scatter).all()
+            continue
+        assert (hard.yielded < 1e-5).all()
+        np.testing.assert_allclose(hard.stiffness, elastic.stiffness, rtol=1e-4)
+        np.testing.assert_allclose(
+            hard.stiffness_scatter, elastic.stiffness_scatter, rtol=1e-4
+        )

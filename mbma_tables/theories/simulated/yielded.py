@@ -146,8 +146,18 @@ class Saturated(Yielding):
             found[..., caps == cap] = part
         return found
 
+    def _is_beyond_reach(self, cap: ArrayLike) -> Any:
+        """Mask of hardnesses that no point reaches, were it to bear the heaviest load alone."""
+        heaviest = self.elastic.rows[0, -1]
+        pressed = self.elastic.pressed
+        assert isinstance(pressed, Press)
+        return np.asarray(cap) >= heaviest * pressed.heights.size
+
     def _simulation(self, cap: float) -> Any:
-        return self.elastic if np.isinf(cap) else plastic(self.elastic, cap)
+        # the contact is the elastic one, whose stiffness is known better than by a simulation
+        # of the frozen contact
+        beyond = self._is_beyond_reach(cap)
+        return self.elastic if beyond else plastic(self.elastic, cap)
 
     def loaded(
         self, surface: AnySurface, mean_separation: FloatArray, lighter: Any = None
@@ -224,11 +234,11 @@ class Saturated(Yielding):
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation against contact at a tolerance of 1e-6.
 
-        "stiffness", the slope of the loading curve, was not compared: NaN, but where the
-        hardness is infinite.
+        "stiffness", the slope of the loading curve, was not compared: NaN, but where no
+        point can reach the hardness.
         """
         elastic = elastic_scatter(self.elastic, surface, quantity, area)
         measured = np.hypot(
             elastic, SCATTER.get(quantity, np.nan if quantity == "stiffness" else 0.0)
         )
-        return np.where(np.isinf(self.hardness), elastic, measured)
+        return np.where(self._is_beyond_reach(self.hardness), elastic, measured)

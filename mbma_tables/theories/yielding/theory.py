@@ -35,6 +35,9 @@ BULK_YIELD = 1 / 3
 FROZEN_ERROR = (
     0.05  # of the stiffness of a frozen contact, root mean square (docs/yield.md)
 )
+# hardness over E* times the rms gradient from which less than 1e-5 of the contact yields, up
+# to the heaviest contacts that are valid, so that the loading curve is the elastic one
+ELASTIC_ETA = 4.0
 MAX_LEVEL = 37.0  # heights over h_rms above which shares underflow
 
 
@@ -352,13 +355,13 @@ class Yielding(Theory):
         That of the calibrated law is measured; for others that of the elastic theory is
         propagated and combined with that of the hardness law. NaN if the elastic theory's
         is not known, and for an unloading stiffness that was not measured. "stiffness", the
-        slope of the loading curve, was not compared with simulations: NaN, but where the
-        hardness is infinite.
+        slope of the loading curve, was not compared with simulations: NaN, but where
+        nothing yields.
         """
         elastic = elastic_scatter(self.elastic, surface, quantity, area)
-        if quantity == "stiffness":
-            return np.where(np.isinf(self.hardness), elastic, np.nan)
         eta = self._eta(surface)
+        if quantity == "stiffness":
+            return np.where(eta >= ELASTIC_ETA, elastic, np.nan)
         return shipped().standard_deviation(
             self.elastic.scatter_name(surface), quantity, eta, area, elastic
         )

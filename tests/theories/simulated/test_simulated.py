@@ -311,6 +311,28 @@ def test_a_curve_that_is_level_at_its_end_goes_on():
     assert (np.diff(curve.log_force(u)) > 0).all()
 
 
+def test_a_hardness_that_no_point_reaches_leaves_the_elastic_contact():
+    values = makers.heights(Part("honed", 1, 64))
+    surface = Surface.from_map(values, 1.0, periodic=True)
+    elastic = contact(surface, pressure=[0.003, 0.02], theory=FULL)
+    for hardness in (1e4, 1e30):
+        hard = contact(
+            surface, Bodies(hardness=hardness), pressure=[0.003, 0.02], theory=FULL
+        )
+        for name in (
+            "unloading_stiffness",
+            "stiffness",
+            "area",
+            "unloading_stiffness_scatter",
+            "stiffness_scatter",
+            "scatter",
+        ):
+            np.testing.assert_allclose(
+                getattr(hard, name), getattr(elastic, name), rtol=1e-12, err_msg=name
+            )
+        assert (hard.yielded == 0).all()
+
+
 @pytest.mark.parametrize("eta", [0.1, 0.4])
 def test_a_hardness_is_simulated(eta):
     values = makers.heights(Part("honed", 1, 128))
