@@ -453,9 +453,9 @@ class Joint(JointQuantities, Displayed):
     ) -> str | bytes | list[pathlib.Path]:
         """The joint as input of a solver, as data or as code, for every target of laws of `mbma export`.
 
-        Conductance is that of the solid spots and of the gas in the gaps together in rows.
-        Laws as code have that of the solid spots, and their comments state that of the gas
-        at some pressures.
+        Conductance in rows, cards and subroutines of solvers is the total one, of the solid
+        spots and of the gas in the gaps together. Laws as code have `total_conductance`, and
+        beside it `solid_conductance` and `gas_conductance`.
 
         Parameters
         ----------

@@ -44,6 +44,8 @@ def blocks_of(asked: AskedLaw) -> dict[str, FloatArray]:
         blocks["ELASTIC"] = asked.sloped.block
     if "leakage" in asked.more:
         blocks["FLOW"] = asked.exported.leakage.block
+    if asked.gas is not None:
+        blocks["GAS"] = asked.gas.block
     return blocks
 
 
@@ -58,6 +60,7 @@ def core_places(asked: AskedLaw, places: Mapping[str, str]) -> dict[str, str]:
         HEADER="",
         NAME=name,
         LEAKAGE=leakage,
+        GAS="" if asked.gas is None else "yes",
     )
     texts = {
         "CORE": core_text(name),

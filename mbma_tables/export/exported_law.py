@@ -40,6 +40,8 @@ NEAREST = 1e-5
 # rounds and parts of the search for an end of validity between two of them
 ROUNDS = 4
 PARTS = 32
+NEAREST_BLOCKED = 1e-9  # share of the blocked gaps that is left out
+BISECTIONS = 60  # of the overclosure from which on a flow is not known
 KAPPA = 0.5, 2.0  # range of normal over tangential stiffness
 GAS_AT = 5  # pressures at which a header has the conductance of the gas alone
 OWN_NUMBERS = (
@@ -154,11 +156,34 @@ class ExportedLaw:
             else self.law.leakage.along(self.direction)
         )
 
-    @property
-    def leaks_unknown(self) -> bool:
-        """Whether the flow is not known, rather than none, where the elastic contact blocks it."""
+    @functools.cached_property
+    def unknown_from(self) -> float:
+        """Overclosure from which on the flow of a yielded contact is not known, infinite if there is none.
+
+        Before it contact blocks the flow, or it is minus infinity: then all that blocks in
+        elastic contact is not known.
+        """
         blocked = self.leakage.blocked_at
-        return bool(blocked > -np.inf and np.isnan(self.leakage(blocked)))
+        if blocked == -np.inf:
+            return np.inf
+        end = float(self.law.block[at.LOWEST])
+        # just inside, where rounding does not count
+        begin = 2 * blocked - self.law.h_max
+        d = np.linspace(begin - NEAREST_BLOCKED * (begin - end), end, LOOKED_AT)
+        unknown = np.isnan(self.leakage(separation=d))
+        if unknown[0]:
+            return -np.inf
+        if not unknown.any():
+            return np.inf
+        first = int(np.argmax(unknown))
+        good, bad = d[first - 1], d[first]
+        for _ in range(BISECTIONS):
+            middle = (good + bad) / 2
+            if np.isnan(self.leakage(separation=middle)):
+                bad = middle
+            else:
+                good = middle
+        return float((self.law.h_max - bad) / 2)
 
     def answer(self, u: FloatArray) -> Any:
         """The theory itself at mean separations; of a body the contacts at approaches that are left to the largest."""
@@ -173,7 +198,7 @@ class ExportedLaw:
         """Lines of a header on what conductance is of: solid spots, and gas in gaps up to an overclosure."""
         if gas is None or gas.gas.name == VACUUM:
             return (
-                "conductance is that of the solid spots alone, without gas in the gaps",
+                "conductance is that of the solid spots alone, without gas in the gaps (contact conductance)",
             )
         u = self.law.h_max - end * np.linspace(0, 1, GAS_AT)
         values = gas.conductance(self.answer(u))
@@ -182,11 +207,15 @@ class ExportedLaw:
             f"{about(value)} at {about(pressure, 3)}"
             for value, pressure in zip(values, pressures, strict=True)
         )
-        what = f"conductance is that of the solid spots and of the gas in the gaps together, {gas}"
+        what = (
+            "conductance is the total (joint) conductance, "
+            f"that of the solid spots and of the gas in the gaps together, {gas}"
+        )
         if not included:
             what = (
-                f"conductance is that of the solid spots ALONE: that of the gas in the gaps, {gas}, is to be added, "
-                "as rows of data such as csv have both"
+                "total_conductance (joint conductance) is that of the solid spots, solid_conductance (contact "
+                "conductance), and that of the gas in the gaps, gas_conductance (gap conductance), together: "
+                f"{gas}"
             )
         return (f"{what}; the gas has {alone} {self.stress}, in {unit}",)
 
@@ -342,10 +371,13 @@ class ExportedLaw:
             load = float(self.law.pressure(blocked))
             c = self.law.h_max - blocked
             where = f"from p = {number(load)} {stress}, c = {number(c)} on"
-            if self.leaks_unknown:
-                yield f"K is not known {where}: the elastic contact blocks there, and a yielded one leaks"
+            unknown = "the elastic contact blocks there, and a yielded one leaks"
+            if self.unknown_from == -np.inf:
+                yield f"K is not known {where}: {unknown}"
             else:
                 yield f"blocked, K = 0, {where}"
+            if np.isfinite(self.unknown_from):
+                yield f"K is not known from c = {number(self.unknown_from)} on: {unknown}"
         else:
             yield "never blocked"
         yield f"K is within {self.leakage.error:.1e} of that at the law's area"

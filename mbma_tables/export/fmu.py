@@ -4,6 +4,7 @@ import contextlib
 import importlib.util
 import io
 import platform
+import re
 import shutil
 import sys
 import uuid
@@ -24,7 +25,9 @@ from mbma_tables.export.text import checked_name, filled, inert, number
 from mbma_tables.surfaces.any_surface import AnySurface
 
 SAID = {
-    "conductance": "through the contact, over nominal area",
+    "solid_conductance": "of the solid spots (contact conductance), over nominal area",
+    "gas_conductance": "of the gas in the gaps (gap conductance), over nominal area",
+    "total_conductance": "of solid spots and gas (joint conductance), over nominal area",
     "tangential_stiffness": "shear stress over displacement before any slip",
     "leakage": "flow coefficient K: K dp/(12 viscosity width) per length of seal, viscosity in stress times s",
 }
@@ -51,7 +54,7 @@ def fmu(
     Parameters
     ----------
     surface, E_star, name, **asked
-        As for `law_text`; a conductivity adds the output conductance, leakage the output leakage.
+        As for `law_text`; a conductivity adds the output solid_conductance, leakage the output leakage.
     binaries : {"here", "all", "none"}
         Beside the sources: a binary for this platform, by the system's C compiler or zig,
         where one of them is installed; binaries for Linux, macOS and Windows on x86-64, by
@@ -61,7 +64,8 @@ def fmu(
     Returns
     -------
     bytes
-        The file, the same for the same law and compiler; its description lists the binaries.
+        The file, the same for the same law and compiler; its description lists the binaries, and the
+        C library that those for Linux need.
 
     Raises
     ------
@@ -90,6 +94,7 @@ def fmu(
         "TOKEN": token,
         "START": variables[1]["start"],
         "LEAKAGE": found.more.get("leakage", ""),
+        "GAS": "" if found.gas is None else "yes",
         "SLOPED": "LAW" if found.sloped is exported.law else "ELASTIC",
         "LEAST": number(exported.c_least, infinity="INFINITY"),
         "MOST": number(exported.c_most),
@@ -101,11 +106,11 @@ def fmu(
     )
     built = _binaries(name, source, binaries)
     listed = (
-        ", ".join(path.split("/")[1] for path in built)
+        ", ".join(map(_platform, built, built.values()))
         or "none, sources only: the importing tool compiles them"
     )
     if binaries == "all":
-        listed += f" (x86-64; linux64 for glibc {GLIBC} and later); on ARM the importing tool compiles the sources"
+        listed += " (x86-64); on ARM the importing tool compiles the sources"
     said = "\n".join(map(inert, (*found.said, f"binaries: {listed}")))
     files = {
         "modelDescription.xml": _description(name, token, said, variables, exported),
@@ -117,6 +122,18 @@ def fmu(
             # without the time of writing: the same law is the same file
             archive.writestr(zipfile.ZipInfo(path), content, zipfile.ZIP_DEFLATED)
     return stream.getvalue()
+
+
+def _platform(path: str, binary: bytes) -> str:
+    """A binary's folder, and of Linux the C library that it needs, by the versions of its symbols."""
+    folder = path.split("/")[1]
+    versions = []
+    for major, minor in re.findall(rb"GLIBC_(\d+)\.(\d+)", binary):
+        versions.append((int(major), int(minor)))
+    if not versions:
+        return folder
+    major_needed, minor_needed = max(versions)
+    return f"{folder} (glibc {major_needed}.{minor_needed} and later)"
 
 
 def _binaries(name: str, source: str, asked: str) -> dict[str, bytes]:

@@ -5,11 +5,18 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from mbma_tables.export.exported_law import ExportedLaw
+from mbma_tables.export.gas_law import GasLaw
 from mbma_tables.export.text import number
 from mbma_tables.law.law import ContactLaw
 
-# functions that are there where they are asked for; all but the last are slopes times a ratio
-MORE = ("conductance", "tangential_stiffness", "leakage")
+# functions that are there where they are asked for; the first two are slopes times a ratio
+MORE = (
+    "solid_conductance",
+    "tangential_stiffness",
+    "gas_conductance",
+    "total_conductance",
+    "leakage",
+)
 FUNCTIONS = (
     "pressure",
     "tangent",
@@ -32,6 +39,7 @@ class AskedLaw(NamedTuple):
     sloped: ContactLaw  # of the contact without a hardness
     more: dict[str, str]  # units of the requested quantities of `MORE`
     said: tuple[str, ...]  # lines of the header
+    gas: GasLaw | None = None  # in the gaps
 
     @property
     def yields(self) -> bool:
@@ -66,8 +74,8 @@ class Language:
     # functions for which @EACH@ is repeated, by default those that are slopes times a ratio
     repeated: Callable[[AskedLaw], dict[str, str]] | None = None
     parts: Mapping[str, str] = dataclasses.field(default_factory=dict)  # other places
-    # a flow that is not known, and none, as texts
-    unknown: str = "(double)NAN"
+    # the flow where contact blocks it: not known from an overclosure on, and none
+    unknown: str = "(c >= {} ? (double)NAN : 0.0)"
     none: str = "0.0"
     beside: tuple[Beside, ...] = ()  # other files of the target
     alone: bool = True  # whether the first file can be used without those beside it

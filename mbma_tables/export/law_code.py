@@ -4,14 +4,18 @@ It is the core's own C (`core_code`), or polynomials in a template a language (`
 """
 
 import functools
+import math
 from typing import Any
 
 from mbma_tables.common.errors import InputError
 from mbma_tables.export.exported_law import ExportedLaw, GasInGaps, exported_law
+from mbma_tables.export.gas_law import gas_law
 from mbma_tables.export.language import FUNCTIONS, AskedLaw, Beside, Language
 from mbma_tables.export.languages import LANGUAGES
 from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import about, checked_name, filled, number, opening
+from mbma_tables.law import block as at
+from mbma_tables.quantities.gas import VACUUM
 from mbma_tables.rough_body.force_law import ForceLaw
 from mbma_tables.surfaces.any_surface import AnySurface
 
@@ -31,8 +35,8 @@ def law_text(
     Parameters
     ----------
     target : str
-        One of `mbma_tables.export.LAWS`; a conductivity adds the function `conductance`,
-        kappa `tangential_stiffness`, of an unloading stiffness that with a hardness is not
+        One of `mbma_tables.export.LAWS`; a conductivity adds the function
+        `solid_conductance`, a gas `gas_conductance` and `total_conductance`, kappa `tangential_stiffness`, of an unloading stiffness that with a hardness is not
         the law's own slope.
     surface, E_star, **asked
         As for `describe_law`: length_unit, stress_unit, variant, theory, hardness,
@@ -117,12 +121,21 @@ def asked_law(
     ratios: dict[str, float] = {}
     units: dict[str, str] = {}
     if conducts:
-        ratios["conductance"], units["conductance"] = exported.slope(
+        ratios["solid_conductance"], units["solid_conductance"] = exported.slope(
             "conductance", conductivity, conductivity_unit
         )
     if kappa is not None:
         ratios["tangential_stiffness"], units["tangential_stiffness"] = exported.slope(
             "tangential_stiffness", kappa=kappa
+        )
+    of_gas = None
+    if conducts and gas is not None and gas.gas.name != VACUUM:
+        of_gas = gas_law(exported, gas)
+        for name_of_heat in ("gas_conductance", "total_conductance"):
+            units[name_of_heat] = units["solid_conductance"]
+        notes = (
+            *notes,
+            f"gas_conductance is within {of_gas.error:.1e} of the theory's",
         )
     if leakage:
         units["leakage"] = f"{exported.length}^3"
@@ -130,10 +143,12 @@ def asked_law(
     sloped, factor = exported.law.unloading() if ratios else (exported.law, 1.0)
     slopes = {quantity: factor * ratio for quantity, ratio in ratios.items()}
     if conducts:
-        of_gas = exported.of_gas(
-            gas, units["conductance"], exported.c_turn, included=False
+        notes = (
+            *notes,
+            *exported.of_gas(
+                gas, units["solid_conductance"], exported.c_turn, included=False
+            ),
         )
-        notes = (*notes, *of_gas)
     said = exported.header(
         _contents(exported, units),
         _range(exported),
@@ -142,7 +157,7 @@ def asked_law(
         end=exported.c_turn,
         leakage=leakage,
     )
-    return AskedLaw(name, exported, slopes, sloped, units, said)
+    return AskedLaw(name, exported, slopes, sloped, units, said, of_gas)
 
 
 def _contents(exported: ExportedLaw, units: dict[str, str]) -> str:
@@ -227,7 +242,8 @@ def _common_places(language: Language, asked: AskedLaw) -> dict[str, str]:
         "C_TURN": language.number(exported.c_turn),
         "C_LEAST": language.number(exported.c_least),
         "C_MOST": language.number(exported.c_most),
-        "CONDUCTANCE": language.ratios(asked).get("conductance", ""),
+        "CONDUCTANCE": language.ratios(asked).get("solid_conductance", ""),
+        **_of_gas(language, asked),
         "LEAKAGE": asked.more.get("leakage", ""),
         "CLOSED": _where_blocked(language, asked),
         "ELASTIC": "yes" if asked.yields else "",
@@ -236,10 +252,26 @@ def _common_places(language: Language, asked: AskedLaw) -> dict[str, str]:
     }
 
 
+def _of_gas(language: Language, asked: AskedLaw) -> dict[str, str]:
+    """Places of the conductance of a gas; SOLID is there where solid spots alone conduct."""
+    conducts = "solid_conductance" in asked.slopes
+    if asked.gas is None:
+        return {"GAS": "", "SOLID": "yes" if conducts else ""}
+    return {
+        "GAS": "yes",
+        "SOLID": "",
+        "GAS_OFFSET": language.number(asked.gas.offset),
+        "GAS_FAR": language.number(asked.gas.far),
+        "GAS_JUMP": language.number(asked.gas.jump),
+        "GAS_TOP": language.number(float(asked.gas.block[at.HIGHEST])),
+    }
+
+
 def _where_blocked(language: Language, asked: AskedLaw) -> str:
-    """The flow where contact blocks it: none, or not known of contact that yields."""
-    unknown = "leakage" in asked.more and asked.exported.leaks_unknown
-    return language.unknown if unknown else language.none
+    """The flow where contact blocks it at c: none, or not known of contact that yields."""
+    if "leakage" not in asked.more or asked.exported.unknown_from == math.inf:
+        return language.none
+    return language.unknown.format(language.number(asked.exported.unknown_from))
 
 
 def _example(exported: ExportedLaw, language: Language) -> str:

@@ -358,7 +358,7 @@ def _table(
     )
     if quantity in FLOWS and exported.leakage.blocked_at >= law.h_max - end:
         why = "where contact blocks the gaps"
-        if exported.leaks_unknown:
+        if exported.unknown_from == -np.inf:
             why = "where the elastic contact blocks the gaps: beyond, the flow of the yielded one is not known"
     elif end < exported.c_turn * (1 - ROUNDING):
         why = "the largest asked for"

@@ -15,7 +15,6 @@ from mbma_tables.export.exported_law import GasInGaps
 from mbma_tables.export.languages import LANGUAGES
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.targets import AGAINST, Target, targets
-from mbma_tables.quantities.gas import VACUUM
 from mbma_tables.quantities.interface import Gas
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import Theory
@@ -282,6 +281,7 @@ def _heat_of_code(
 ) -> dict[str, Any]:
     """The conductivity of a law as code, and its gas; or a note that conductance is left out."""
     language = LANGUAGES.get(target)
+    # of a routine that the solver asks for conductance
     alone = language is not None and language.conductance_alone
     if heat is False:
         if alone:
@@ -290,12 +290,6 @@ def _heat_of_code(
     if heat is None and joint.conductivity is None and not alone:
         notes.append("without conductance: the bodies have no thermal conductivity")
         return {}
-    if language and language.subroutine and joint.gas.name != VACUUM:
-        raise InputError(
-            f"{target} has the conductance of the solid spots alone, without that of {joint.gas.name} in the gaps: "
-            "take rows, which have both, such as target 'abaqus' or 'calculix', or a joint with gas='vacuum'; "
-            "heat=False leaves conductance out"
-        )
     conductivity, unit = _conductivity(joint, units)
     return conductivity | {"gas": GasInGaps(joint.gas, unit)}
 

@@ -64,6 +64,8 @@ def polynomial_places(asked: AskedLaw, notation: Notation) -> dict[str, str]:
     places = law_places(asked.exported.law, notation)
     if "leakage" in asked.more:
         places |= _written("FLOW_", flow_numbers(asked.exported.leakage), notation)
+    if asked.gas is not None:
+        places |= _written("GAS_", record_numbers(asked.gas.block), notation)
     return places
 
 
@@ -89,14 +91,17 @@ def _written(
 
 def flow_numbers(leakage: LeakageLaw) -> dict[str, float | FloatArray]:
     """Numbers of a law's leakage, by name."""
-    head = leakage.block
+    return record_numbers(leakage.block) | {"h_rms": leakage.h_rms}
+
+
+def record_numbers(head: FloatArray) -> dict[str, float | FloatArray]:
+    """Numbers of a block of one side, by name."""
     side = _sides(head)[0]
     records = side.records
     return {
         "blocked": -float(head[at.H_MAX]),
         "scale": float(head[SCALE]),
         "power": float(head[POWER_F]),
-        "h_rms": leakage.h_rms,
         "edges": side.begins[1:],
         "centre": records[:, CENTRE],
         "rate": records[:, RATE],

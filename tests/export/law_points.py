@@ -32,7 +32,7 @@ ROAD = Surface(0.8, 0.01, 2.0, 1.0, 3.0, unit="mm")
 ASKED = {
     "mbma": (ROAD, {"theory": "mbma"}),
     "calibrated": (ROAD, {"theory": "calibrated"}),
-    "hardened": (ROAD, {"theory": "calibrated", "hardness": 2.0}),
+    "hardened": (ROAD, {"theory": "calibrated", "hardness": 1.5}),
     "persson": (ROAD, {"theory": "persson"}),
     # its area turns down without blocking, and its slopes are flat where coefficients are rounded
     "flat": (Surface(0.23, 1.0, 1.5e4, 0.125, 0.1875, unit="mm"), {"theory": "mbma"}),

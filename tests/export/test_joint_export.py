@@ -1,5 +1,6 @@
 """A joint in files for other programs has what its table has: all targets and files, gas, any names and units."""
 
+import ctypes
 import dataclasses
 import io
 import json
@@ -7,26 +8,27 @@ import math
 import pathlib
 import re
 import subprocess
+import types
 import zipfile
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from helpers import compiled_law
 from law_points import needs
 from test_fields import GETDP, MESH
 from test_programs import TOP, calculix, conductance, each, heated
 
-from mbma_tables import Bodies, InputError, Joint
+from mbma_tables import Bodies, InputError, Joint, contact
 from mbma_tables.cli import main
 from mbma_tables.export.targets import targets
-from mbma_tables.export.text import number
+from mbma_tables.export.text import number, template
 
 FACE = {"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
 METALS = ("steel 4140 hard", "aluminium 6061 hard")
 EXAMPLE = pathlib.Path(__file__).parents[2] / "examples" / "joint.toml"
 SPAN = ("10 kPa", "100 MPa")  # four decades
 OF_LAWS = [name for name, each in targets().items() if name != "c"]
-ROUTINES = ("abaqus-uinter", "abaqus-gapcon", "calculix-gapcon")
 
 
 @pytest.fixture(scope="module")
@@ -55,10 +57,9 @@ def test_every_target_takes_a_joint_with_a_name(joint, target, tmp_path):
     if target == "parquet":
         pytest.importorskip("pyarrow")
     kind = targets()[target]
-    of_solids = dataclasses.replace(joint, gas="vacuum") if target in ROUTINES else joint
     path = tmp_path / f"bolt{kind.end or '.txt'}"
     options = {"binaries": "none"} if target == "fmu" else {}
-    written = of_solids.export(
+    written = joint.export(
         target, SPAN if kind.rows else None, name="bolt", path=path, **options
     )
     assert written[-1] == path
@@ -108,20 +109,212 @@ def test_without_gas_rows_are_of_the_solid(joint):
     assert "solid spots alone, without gas" in " ".join(content["comments"])
 
 
-def test_code_says_what_the_gas_adds(joint):
-    """Functions have the conductance of solid spots; their comments state that of the gas, and what to do."""
+def test_code_says_what_its_conductances_are(joint):
     text = " ".join(joint.export("c-law", name="bolt").replace(" * ", " ").split())
-    assert "solid spots ALONE" in text
-    assert "as rows of data such as csv have both" in text
-    listed = re.search(r"the gas has (.*?) MPa, in (\S+ \S+)", text)
-    assert listed[2] == "mW/(mm K)/mm"
-    gas, pressure = map(float, listed[1].split(", ")[2].split(" at "))
-    own = joint.table([f"{pressure} MPa"])["gas_conductance"].to_numpy()[0]
-    assert 1000 * gas == pytest.approx(own, rel=5e-3)
-    for target in ROUTINES:
-        with pytest.raises(InputError, match=r"take rows, which have both.*gas='vacuum'"):
-            joint.export(target)
+    for words in (
+        "total_conductance (joint conductance) is that of the solid spots",
+        "solid_conductance (contact conductance)",
+        "gas_conductance (gap conductance)",
+        "air at 300.0 K and 101325.0 Pa",
+    ):
+        assert words in text
+    vacuum = dataclasses.replace(joint, gas="vacuum").export("c-law", name="bolt")
+    assert "bolt_solid_conductance(double c);" in vacuum
+    assert "total_conductance" not in vacuum
     assert "double *stress" in joint.export("abaqus-uinter", heat=False)
+
+
+PRESSURES = np.array([1e-3, 0.01, 0.1, 1.0, 10.0, 100.0])  # MPa
+APART = np.array([1e-6, 1e-4, 3e-3, 0.03, 0.3, 30.0])  # mm beyond the first contact
+CONDUCTANCES = ("solid_conductance", "gas_conductance", "total_conductance")
+
+
+@pytest.fixture(scope="module")
+def elastic():
+    """A joint whose law every language writes with conductance."""
+    return Joint(
+        FACE, bodies=("steel 4140", "copper C11000"), nominal_area="4 cm^2",
+        theory="calibrated",
+    )  # fmt: skip
+
+
+def assert_conducts(joint, answer):
+    """`answer(name, c)` of a file is the joint's own in contact, and the contact's where bodies are apart."""
+    asked = joint.at_pressure([f"{p!r} MPa" for p in PRESSURES.tolist()])
+    c = 1e-3 * (joint.surface.h_max - np.asarray(asked.mean_separation))
+    for name in CONDUCTANCES:
+        expected = np.asarray(asked.quantity(name)) / 1000
+        np.testing.assert_allclose(answer(name, c), expected, rtol=1e-5)
+    apart = contact(
+        joint.surface, joint.bodies, mean_separation=joint.surface.h_max + 1e3 * APART
+    )
+    gas = np.asarray(apart.gap_conductance("air")) / 1000
+    np.testing.assert_allclose(answer("total_conductance", -APART), gas, rtol=1e-4)
+    assert (answer("solid_conductance", -APART) == 0).all()
+
+
+@needs("gcc")
+@pytest.mark.parametrize("hard", [True, False])
+def test_c_conducts_as_solid_and_gas(hard, joint, elastic, tmp_path):
+    of = joint if hard else elastic
+    of.export("c-law", name="road", path=tmp_path / "road.c")
+    options = ("-std=c99", "-Wconversion", "-Wshadow", "-O2")
+    assert_conducts(of, compiled_law(tmp_path / "road.c", *options))
+
+
+def test_python_conducts_as_solid_and_gas(elastic):
+    road = types.ModuleType("road")
+    exec(elastic.export("python-law", name="road"), road.__dict__)
+    assert_conducts(elastic, lambda name, c: getattr(road, name)(c))
+
+
+def test_jax_conducts_as_solid_and_gas(elastic):
+    jax = pytest.importorskip("jax")
+    road = types.ModuleType("road")
+    with jax.enable_x64(True):
+        exec(elastic.export("jax-law", name="road"), road.__dict__)
+        assert_conducts(elastic, lambda name, c: np.asarray(getattr(road, name)(c)))
+        slope = jax.grad(road.total_conductance)
+        c = 1e-3
+        by = 1e-7
+        both = road.total_conductance(np.array([c - by, c + by]))
+        assert float(slope(c)) == pytest.approx(
+            float(both[1] - both[0]) / 2 / by, rel=1e-4
+        )
+
+
+@needs("node")
+def test_javascript_conducts_as_solid_and_gas(joint, tmp_path):
+    joint.export("javascript-law", name="road", path=tmp_path / "road.cjs.mjs")
+    (tmp_path / "road.mjs").write_text((tmp_path / "road.cjs.mjs").read_text())
+    program = "import * as road from './road.mjs'; const [what, c] = JSON.parse(process.argv[2]); "
+    program += "console.log(JSON.stringify(c.map(road[what])))"
+    (tmp_path / "ask.mjs").write_text(program)
+
+    def answer(name, c):
+        asked = json.dumps([name, np.asarray(c).tolist()])
+        done = subprocess.run(
+            ["node", "ask.mjs", asked], cwd=tmp_path, capture_output=True, text=True, check=True
+        )  # fmt: skip
+        return np.array(json.loads(done.stdout))
+
+    assert_conducts(joint, answer)
+
+
+@needs("octave-cli")
+@pytest.mark.slow
+def test_octave_conducts_as_solid_and_gas(elastic, tmp_path):
+    elastic.export("matlab-law", name="road", path=tmp_path / "road.m")
+
+    def answer(name, c):
+        np.savetxt(tmp_path / "c.txt", c, "%.17g")
+        code = f"law = road(); printf('%.17g\\n', law.{name}(load('c.txt')));"
+        words = ["octave-cli", "--no-init-file", "--eval", code]
+        done = subprocess.run(
+            words, cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        return np.array(done.stdout.split(), float)
+
+    assert_conducts(elastic, answer)
+
+
+@pytest.mark.slow
+def test_an_fmu_conducts_as_solid_and_gas(joint, tmp_path):
+    fmpy = pytest.importorskip("fmpy")
+    path = tmp_path / "road.fmu"
+    joint.export("fmu", name="road", path=path, binaries="here")
+
+    def answer(name, c):
+        times = np.arange(len(c) + 1.0)
+        given = np.array(
+            list(zip(times, [*c, c[-1]], strict=True)),
+            [("time", float), ("overclosure", float)],
+        )
+        found = fmpy.simulate_fmu(
+            str(path), fmi_type="CoSimulation", input=given, output=[name],
+            stop_time=times[-1], step_size=1.0, output_interval=1.0,
+        )  # fmt: skip
+        return found[name][1:]
+
+    assert_conducts(joint, answer)
+
+
+def routine(name, joint, folder):
+    """The routine of a solver, in C, of the joint's law."""
+    text = joint.export(name, name="road")
+    if name.startswith("abaqus"):
+        text += "void xit_(void) {}\n"  # of Abaqus
+    (folder / "road.c").write_text(text)
+    library = compiled_law(folder / "road.c", "-std=c99", "-O2").library
+    return library[f"road_{name.partition('-')[2]}"]
+
+
+@needs("gcc")
+@pytest.mark.parametrize("target", ["abaqus-gapcon", "calculix-gapcon"])
+def test_gapcon_has_the_gas(target, joint, total, tmp_path):
+    function = routine(target, joint, tmp_path)
+
+    def asked(clearance, pressure):
+        ak = (ctypes.c_double * 5)()
+        function(ak, (ctypes.c_double * 2)(clearance, pressure), *[None] * 13)
+        return np.array(ak)
+
+    for pressure in PRESSURES.tolist():
+        assert 1000 * asked(0.0, pressure)[0] == pytest.approx(
+            total([pressure])[0], rel=1e-5
+        )
+    by = 1e-4
+    slope = (asked(0.0, 1 + by)[0] - asked(0.0, 1 - by)[0]) / (2 * by)
+    assert asked(0.0, 1.0)[2] == pytest.approx(slope, rel=1e-5)
+    # apart: by the clearance from where surfaces touch, h_max above the mean plane
+    apart = contact(
+        joint.surface, joint.bodies, mean_separation=joint.surface.h_max + 3.0
+    )
+    assert asked(3e-3, 0.0)[0] == pytest.approx(
+        float(apart.gap_conductance("air")) / 1000, rel=1e-5
+    )
+    slope = (asked(3.01e-3, 0.0)[0] - asked(2.99e-3, 0.0)[0]) / 2e-5
+    assert asked(3e-3, 0.0)[1] == pytest.approx(slope, rel=1e-4)
+
+
+# of UINTER, in the order of the manual
+LISTED = template("languages/uinter.c").partition("#define UINTER_ARGUMENTS")[2]
+ARGUMENTS = re.findall(r"\w+", LISTED.partition("#endif")[0])
+
+
+@needs("gcc")
+def test_uinter_has_the_gas(joint, total, tmp_path):
+    function = routine("abaqus-uinter", joint, tmp_path)
+
+    def asked(c):
+        numbers = {"rdisp": [c, 0.0], "temp": [20.0, 120.0], "ndir": 2, "linper": 0}
+        made = {}
+        for name in ARGUMENTS:
+            given = numbers.get(name, [0.0] * 16)
+            whole = isinstance(given, int) or name == "lopenclose"
+            kind = ctypes.c_int if whole else ctypes.c_double
+            values = [given] if isinstance(given, int) else given
+            made[name] = (kind * 16)(*(int(v) if whole else v for v in values))
+        function(*made.values())
+        return made["flux"][0], made["ddfddt"][0], made["ddfddr"][0], made["stress"][0]
+
+    pressed = joint.at_pressure("10 MPa")
+    c = 1e-3 * float(joint.surface.h_max - pressed.mean_separation)
+    flux, conductance, slope, stress = asked(c)
+    assert stress == pytest.approx(10.0, rel=1e-6)
+    assert flux == pytest.approx(total([10.0])[0] / 10, rel=1e-5)
+    assert conductance == pytest.approx(flux / 100, rel=1e-14)
+    by = 1e-8
+    assert slope == pytest.approx(
+        (asked(c + by)[0] - asked(c - by)[0]) / 2 / by, rel=1e-5
+    )
+    apart = contact(
+        joint.surface, joint.bodies, mean_separation=joint.surface.h_max + 3.0
+    )
+    flux, *_, stress = asked(-3e-3)
+    assert stress == 0
+    assert flux == pytest.approx(float(apart.gap_conductance("air")) / 10, rel=1e-5)
+    assert abs(asked(-1e36)[0]) < 1e-30
 
 
 @pytest.mark.parametrize("target", ["python-law", "jax-law", "matlab-law"])
@@ -146,15 +339,15 @@ def test_files_that_need_others_are_written_to_a_path(joint):
 def test_fortran_of_a_joint_runs_with_its_own_files(joint, tmp_path):
     joint.export("fortran-law", name="bolt", path=tmp_path / "bolt.f90")
     (tmp_path / "main.f90").write_text(
-        "program p\n  use bolt\n  implicit none\n  print '(es24.16)', conductance(overclosure(10d0))\nend program\n"
+        "program p\n  use bolt\n  implicit none\n  print '(es24.16)', total_conductance(overclosure(10d0))\nend program\n"
     )
     build = "cc -O1 -c bolt_c.c && gfortran bolt.f90 main.f90 bolt_c.o -lm -o run"
     subprocess.run(build, shell=True, cwd=tmp_path, check=True, capture_output=True)
     ran = subprocess.run(
         ["./run"], cwd=tmp_path, check=True, capture_output=True, text=True
     )
-    solid = joint.table(["10 MPa"])["solid_conductance"].to_numpy()[0]
-    assert 1000 * float(ran.stdout) == pytest.approx(solid, rel=1e-4)
+    own = joint.table(["10 MPa"])["total_conductance"].to_numpy()[0]
+    assert 1000 * float(ran.stdout) == pytest.approx(own, rel=1e-5)
 
 
 @pytest.mark.parametrize(("length", "stress"), [("m", "Pa"), ("um", "GPa"), ("mm", "Pa")])

@@ -77,7 +77,7 @@ def test_c(name, compiled):
         found[1][0],
     )
     known.assert_slopes(
-        *(law(what, known.c) for what in ("conductance", "tangential_stiffness"))
+        *(law(what, known.c) for what in ("solid_conductance", "tangential_stiffness"))
     )
 
 
@@ -236,7 +236,7 @@ def test_two_laws_with_headers_in_c_and_cpp(tmp_path):
         (tmp_path / f"{name}.c").write_text(files[""])
         (tmp_path / f"{name}.h").write_text(files[".h"])
     (tmp_path / "uinter.c").write_text(law_points.text("abaqus-uinter", "mbma", **HEAT))
-    asks = "road_with_tangent(1.0, &k), road_leakage(1.0), road_conductance(1.0), road_overclosure(0.01), seal_area(0.5)"
+    asks = "road_with_tangent(1.0, &k), road_leakage(1.0), road_solid_conductance(1.0), road_overclosure(0.01), seal_area(0.5)"
     text = '#include "road.h"\n#include "seal.h"\n#include "road.h"\n#include <stdio.h>\nint main(void) { double k; '
     (tmp_path / "ask.c").write_text(
         f'{text}printf("%.17g %.17g %.17g %.17g %.17g", {asks}); return 0; }}\n'
@@ -331,7 +331,7 @@ def test_python(name, tmp_path):
     ) == turns
     if heat:
         np.testing.assert_allclose(
-            road.conductance(known.c),
+            road.solid_conductance(known.c),
             CONDUCTIVITY / 13.3 * road.tangent(known.c),
             rtol=1e-15,
         )
@@ -346,6 +346,30 @@ def test_python(name, tmp_path):
     if name == "calibrated":  # numpy is all that it needs
         code = "import sys, road; print(sorted({'scipy', 'numba', 'mbma_tables'} & sys.modules.keys()))"
         assert run(sys.executable, "-c", code, folder=tmp_path) == "[]\n"
+
+
+@pytest.mark.parametrize("hardness", [0.6, 1.5, 5.0])
+def test_the_flow_of_a_yielded_seal_is_not_zero_where_it_is_not_known(hardness):
+    """All that blocks in elastic contact, a part of it, or none of it is not known."""
+    made = law_of_names(
+        law_points.ROAD, "13.3 MPa", theory="calibrated", hardness=hardness
+    )
+    text = law_text(
+        "python-law", law_points.ROAD, "13.3 MPa", theory="calibrated",
+        hardness=hardness, leakage=True,
+    )  # fmt: skip
+    road = types.ModuleType("road")
+    exec(text, road.__dict__)
+    c = 3.0 - np.linspace(made.leakage.blocked_at * (1 + 1e-9), 1e-5, 2001)
+    known = np.asarray(made.leakage(3.0 - c))
+    found = road.leakage(c)
+    np.testing.assert_allclose(found, known, rtol=VALUES, atol=1e-12)
+    unknown = np.isnan(found[1:]).mean()
+    assert (unknown == 1) == (hardness == 0.6)
+    assert (unknown == 0) == (hardness == 5.0)
+    listed = " ".join(text.replace("#", " ").split())
+    assert ("K is not known from" in listed) == (hardness < 5)
+    assert ("blocked, K = 0, from" in listed) == (hardness > 1)
 
 
 def random_faces(count, seed):
@@ -716,7 +740,7 @@ end asked;
 model Ask
   Real c; Real p; Real k; Real h; Real s; Real a; Real e; Real l;
 equation
-  c = asked.at(time); p = road.pressure(c); h = road.conductance(c); a = road.area(c); e = road.energy(c);
+  c = asked.at(time); p = road.pressure(c); h = road.solid_conductance(c); a = road.area(c); e = road.energy(c);
   l = road.leakage(c); k = road.tangent(c); s = road.tangential_stiffness(c);
 end Ask;
 """
@@ -809,7 +833,7 @@ def javascript_files(folder):
 
 ASK_BOTH = """
 const answers = (road, c) => [
-  road.pressure(c), ...road.with_tangent(c), road.tangent(c), road.curvature(c), road.conductance(c),
+  road.pressure(c), ...road.with_tangent(c), road.tangent(c), road.curvature(c), road.solid_conductance(c),
 ];
 console.log(JSON.stringify(%s.map((c) => answers(road, c))));
 """
@@ -851,7 +875,7 @@ def test_node_opens_a_law_by_import_and_by_require(program, opens, tmp_path):
 TYPED = """
 const pressure: number = road.pressure(0.2);
 const both: [number, number] = road.with_tangent(0.2);
-const more: number[] = [road.curvature(0.2), road.conductance(0.2), road.overclosure(pressure), ...both];
+const more: number[] = [road.curvature(0.2), road.solid_conductance(0.2), road.overclosure(pressure), ...both];
 export { more };
 """
 

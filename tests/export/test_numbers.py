@@ -189,7 +189,7 @@ def test_numbers_of_code_have_a_point():
     assert re.search(r"constant Real h_max = (\S+),", code["modelica-law"])[1] == "4.0"
     assert "y := 2.0*tangent(c);" in code["modelica-law"]
     assert "return 2.0 * mbma_law_at_overclosure" in code["c-law"]
-    assert "conductance = (c) => 2.0 * ask" in code["javascript-law"]
+    assert "solid_conductance = (c) => 2.0 * ask" in code["javascript-law"]
     assert "@(c) 2.0*kept.tangent(c)" in code["matlab-law"]
     for arrays in ("edges", "centre", "rate", "energies", "p", "a"):
         held = re.search(rf'"{arrays}": np.array\((.*?)\)', code["python-law"], re.S)[1]

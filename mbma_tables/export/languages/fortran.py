@@ -23,7 +23,8 @@ def _public(asked: AskedLaw) -> list[str]:
 
 
 def _law_places(asked: AskedLaw, places: Mapping[str, str]) -> dict[str, str]:
-    return {"PUBLIC": ", ".join(_public(asked))}
+    # a line each: a line has 132 letters at most
+    return {"PUBLIC": ", &\n    ".join(_public(asked))}
 
 
 def _functions(asked: AskedLaw) -> dict[str, str]:

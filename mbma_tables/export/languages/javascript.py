@@ -38,7 +38,7 @@ LANGUAGES = {
         law_places=_law_places,
         number=functools.partial(number, infinity="Infinity"),
         parts={"EXPORT": "export"},
-        unknown="NaN",
+        unknown="(c >= {} ? NaN : 0)",
         beside=(
             Beside(".cjs", "languages/law.mjs", parts={"EXPORT": "module.exports ="}),
             Beside(".d.mts", "languages/law.d.mts"),

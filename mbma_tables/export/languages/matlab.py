@@ -33,7 +33,8 @@ LANGUAGES = {
         call="law.{what}({x})",
         law_places=_law_places,
         number=_notation.number,
-        unknown="NaN",
+        # 0/1, or 0/0, which is NaN
+        unknown="0./(c(closed) < {})",
         reserved=_reserved,
         unloads=False,
     )

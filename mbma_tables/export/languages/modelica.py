@@ -48,7 +48,7 @@ def _law_places(asked: AskedLaw, places: Mapping[str, str]) -> dict[str, str]:
     if not asked.yields:
         return polynomials | {"SLOPED": "tangent"}
     elastic = law_places(asked.sloped, _notation)
-    only = {"NAME": "elastic", "HEADER": "", "LEAKAGE": "", "ELASTIC": ""}
+    only = {"NAME": "elastic", "HEADER": "", "LEAKAGE": "", "GAS": "", "ELASTIC": ""}
     text = filled(TEMPLATE, **{**places, **polynomials, **elastic, **only}).strip()
     # some tools confuse names of a package with those of one in it
     names = "|".join(
@@ -70,7 +70,7 @@ LANGUAGES = {
         law_places=_law_places,
         number=_notation.number,
         # of an assertion: Modelica has no NaN
-        unknown="false",
+        unknown="c < {}",
         none="true",
         reserved=_reserved,
         # tools solve for c themselves

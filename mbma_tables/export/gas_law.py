@@ -1,0 +1,80 @@
+"""Conductance of a gas in the gaps as polynomials of the gap, for laws as code."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.units import factor
+from mbma_tables.core import core
+from mbma_tables.export.exported_law import ExportedLaw, GasInGaps
+from mbma_tables.law import block as at
+from mbma_tables.law.block import Side, assemble, first_record, power_record, side_pieces
+from mbma_tables.quantities.gas import jump_of
+
+# tolerance of the polynomials, relative to the value there and that at first contact
+RTOL = 1e-5
+# mean gap over h_max at which the polynomials end, where contact ends
+FAR = 100.0
+# mean gap over h_max below which there is none
+NEAREST = 1e-9
+# powers of two below which gaps are in one record, at the most and at the least
+OCTAVES = range(6, 21)
+CHECKED = 501
+
+
+class GasLaw(NamedTuple):
+    """Conductance of a gas against the gap d, in the unit of a law's conductance.
+
+    It is the block's force less `offset`, and far / (u + jump) where the bodies are farther
+    apart than the block reaches.
+    """
+
+    block: FloatArray
+    offset: float
+    far: float
+    jump: float  # temperature jump of both faces, in the law's unit of length
+    error: float  # of the polynomials, relative to the value, where bodies touch
+
+
+def gas_law(exported: ExportedLaw, gas: GasInGaps) -> GasLaw:
+    """The conductance of a gas in the gaps of an exported law."""
+    law = exported.law
+    h_max = law.h_max
+    bottom = float(law.block[at.LOWEST])
+    top = (2 * FAR - 1) * h_max if exported.ends else law.highest
+    span = top - bottom
+
+    def conductance(d: FloatArray) -> FloatArray:
+        u = np.maximum((h_max + d) / 2, NEAREST * h_max)
+        return gas.conductance(exported.answer(u))
+
+    # near full contact the gas has nothing left: what is added keeps the sum positive
+    offset = float(conductance(np.array([min(h_max, top)]))[0])
+
+    def values(x: FloatArray) -> FloatArray:
+        whole = offset + conductance(bottom + span * x)
+        return np.stack([whole, whole])
+
+    start, first = first_record(
+        lambda start: power_record(values, start, (0.0, 0.0)), OCTAVES, RTOL
+    )
+    kinks = ((h_max - bottom) / span,) if exported.ends else ()
+    side = Side(1, start, values, kinks)
+    pieces = side_pieces(side, RTOL)
+    block, _, _ = assemble(-bottom, 1 / span, [side], [pieces], first, (bottom, top))
+    block.view(np.int64)[at.ENDS] = 0
+    metre = factor("m", exported.length)
+    _, jump = jump_of(
+        gas.gas.name, gas.gas.temperature, gas.gas.pascals, gas.gas.accommodation
+    )
+    jump_length = float(jump) * metre
+    u_far = (h_max + top) / 2
+    far = (float(values(np.array([1.0]))[0, 0]) - offset) * (u_far + jump_length)
+    d = np.linspace(bottom, min(h_max, top), CHECKED)
+    written = np.empty(CHECKED)
+    core.law_fill(d, block, written, *[None] * 4)
+    error = np.abs((written - offset) / conductance(d) - 1)
+    # next to full contact the gas has nothing left
+    kept = conductance(d) > RTOL * offset
+    return GasLaw(block, offset, far, jump_length, float(error[kept].max(initial=0.0)))
