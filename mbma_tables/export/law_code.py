@@ -135,7 +135,8 @@ def asked_law(
             units[name_of_heat] = units["solid_conductance"]
         notes = (
             *notes,
-            f"gas_conductance is within {of_gas.error:.1e} of the theory's",
+            f"gas_conductance is within {of_gas.error:.1e} of the theory's, relative to it, "
+            "or to that at first contact where that is larger",
         )
     if leakage:
         units["leakage"] = f"{exported.length}^3"
