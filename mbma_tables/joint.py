@@ -307,12 +307,35 @@ class Joint(JointQuantities, Displayed):
 
     def at_pressure(self, pressure: ArrayLike | str) -> Contact:
         """The contact at pressures F/A0 ("10 MPa"; plain numbers in the unit of the modulus), as of `contact`: each in first loading."""
+        return self.at(pressure=pressure)
+
+    def at(
+        self,
+        *,
+        separation: ArrayLike | str | None = None,
+        mean_separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
+    ) -> Contact:
+        """The contact at a gap, a pressure or an area, as of `contact`: each in first loading.
+
+        Examples
+        --------
+        >>> from mbma_tables import Joint
+        >>> face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+        >>> joint = Joint(face, bodies="steel 1020", nominal_area="4 cm^2", theory="calibrated")
+        >>> pressed = joint.at(mean_separation="2 um")
+        >>> f"{pressed.area:.2%}, {joint.at(area=pressed.area).mean_separation:.3f} um"
+        '0.29%, 2.000 um'
+        """
+        candidates = {
+            "separation": separation,
+            "mean_separation": mean_separation,
+            "pressure": pressure,
+            "area": area,
+        }
         return contact_of(
-            self.surface,
-            self.bodies,
-            {"pressure": pressure},
-            self.theory,
-            self.interface,
+            self.surface, self.bodies, candidates, self.theory, self.interface
         )
 
     def law(self) -> ContactLaw:

@@ -64,6 +64,27 @@ def test_a_joint_is_the_contact_of_the_combined_surface(joint):
     assert joint.surface.h_rms == pytest.approx(np.hypot(0.4, 0.7), rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"separation": "1 um"},
+        {"mean_separation": ["1.5 um", "2 um"]},
+        {"pressure": "10 MPa"},
+        {"area": [0.001, 0.01]},
+    ],
+    ids=lambda asked: next(iter(asked)),
+)
+def test_it_is_asked_as_contact_is(joint, asked):
+    found = joint.at(**asked)
+    known = contact(joint.surface, METALS, **asked)
+    assert found.theory == known.theory
+    for name in ("pressure", "area", "mean_separation", "separation", "stiffness"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(known, name))
+    assert np.all(found.total_conductance > found.solid_conductance)
+    with pytest.raises(InputError, match="give exactly one of"):
+        joint.at(**asked, **({"area": 0.1} if "pressure" in asked else {"pressure": 1}))
+
+
 def test_its_law_and_sensitivity(joint):
     law = joint.law()
     found = joint.at_pressure("10 MPa")

@@ -40,27 +40,23 @@ __all__ = [
     "resolve",
 ]
 
-# the shipped theories: names and classes, whose fields are their options
+# the shipped theories: modules and classes by name; their fields are their options
 _NAMED = {
-    "mbma": "Mbma",
-    "calibrated": "Calibrated",
-    "persson": "Persson",
-    "greenwood_williamson": "GreenwoodWilliamson",
-    "simulated": "Simulated",
+    "mbma": ("mbma.theory", "Mbma"),
+    "calibrated": ("calibrated.theory", "Calibrated"),
+    "persson": ("persson", "Persson"),
+    "greenwood_williamson": ("greenwood_williamson", "GreenwoodWilliamson"),
+    "simulated": ("simulated.theory", "Simulated"),
 }
 OF_MAPS = ("simulated",)  # theories of one map, made by simulating it
 THEORIES = tuple(name for name in _NAMED if name not in OF_MAPS)
 NONE: Mapping[str, Any] = types.MappingProxyType({})
 # a theory's module is imported when first needed
 _HOMES = {
-    "Mbma": "mbma.theory",
+    **{made: module for module, made in _NAMED.values()},
     "Variant": "mbma.variants",
-    "Calibrated": "calibrated.theory",
-    "Persson": "persson",
     "Method": "persson",
-    "GreenwoodWilliamson": "greenwood_williamson",
     "BoundaryElements": "simulated.one_map",
-    "Simulated": "simulated.theory",
     "Theory": "base",
     "TheoryAnswer": "base",
     "UserTheory": "base",
@@ -129,7 +125,7 @@ def resolve(
 @shared()
 def _shipped(name: str) -> Any:
     """A shipped theory with its defaults, made once per process."""
-    return __getattr__(_NAMED[name])()
+    return _class_of(name)()
 
 
 def _of_object(chosen: Any, surface: Any) -> Theory:
@@ -155,19 +151,22 @@ def _of_object(chosen: Any, surface: Any) -> Theory:
 
 def _with_options(name: str, options: Mapping[str, Any]) -> Any:
     """A shipped theory with options; those that it does not have are refused."""
-    make = __getattr__(_NAMED[name])
     others = [option for option in options if option not in _options_of(name)]
     if others:
         owners = [other for other in _NAMED if others[0] in _options_of(other)]
         of = f" of theory {owners[0]!r} alone" if owners else ""
         raise InputError(f"{', '.join(others)}: options{of}, not of {name!r}")
-    return make(**options)
+    return _class_of(name)(**options)
 
 
 def _options_of(name: str) -> list[str]:
     """Names of the options of a shipped theory."""
-    make = __getattr__(_NAMED[name])
-    return [field.name for field in dataclasses.fields(make)]
+    return [field.name for field in dataclasses.fields(_class_of(name))]
+
+
+def _class_of(name: str) -> Any:
+    """The class of a shipped theory."""
+    return __getattr__(_NAMED[name][1])
 
 
 def default_name(
