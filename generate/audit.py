@@ -16,7 +16,7 @@ import hypothesis
 import numpy as np
 from hypothesis import strategies as st
 
-from generate.audit_routes import Question, routes_here
+from generate.audit_routes import Misses, Question, Reference, refusals, routes_here
 from generate.boundary_elements.evidence import evidence
 from generate.files import ROOT
 from generate.page import table
@@ -442,39 +442,38 @@ def failures(seed: int, scale: float) -> list[Found]:
 def routes(seed: int, scale: float) -> list[Found]:
     """Differences of each route from a joint's contact, over rounding or the errors that both state."""
     rng = np.random.default_rng(seed)
-    asked_by = routes_here()
-    counts = dict.fromkeys(asked_by, 0)
-    beyond = dict.fromkeys(asked_by, 0)
-    worst = dict.fromkeys(asked_by, 0.0)
-    places = dict.fromkeys(asked_by, "")
+    rows: dict[str, Found] = {}
     refused = 0
     for _ in range(max(int(ROUTE_QUESTIONS * scale), 1)):
+        question = Question.random(rng)
         try:
-            question = Question(rng)
+            reference = Reference(question)
         except MbmaError:
             refused += 1
+            _count(rows, "refusals", {"answered": refusals(question)}, question)
             continue
-        for name, route in asked_by.items():
-            # what the joint answers each route answers too: an error is one more difference
+        for name, route in routes_here().items():
+            # an error where the joint answers is one more difference
             try:
-                ratios = np.concatenate(route(question))
-                where = repr(question)
+                misses = route(reference)
             except MbmaError as fault:
-                ratios = np.array([np.inf])
-                where = f"{fault}: {question!r}"
-            ratios = np.where(np.isnan(ratios), np.inf, ratios)
-            counts[name] += ratios.size
-            beyond[name] += int((ratios > 1).sum())
-            if ratios.max() > worst[name]:
-                worst[name] = float(ratios.max())
-                places[name] = where
-    rows = []
-    for name in asked_by:
-        what = f"routes: joint and {name}"
-        rows.append(
-            Found(what, counts[name], refused, beyond[name], worst[name], places[name])
-        )
-    return rows
+                misses = {str(fault): np.array([np.inf])}
+            _count(rows, name, misses, question)
+    return [row._replace(refused=refused) for row in rows.values()]
+
+
+def _count(
+    rows: dict[str, Found], route: str, misses: Misses, question: Question
+) -> None:
+    """Add the differences of one question to the row of a route."""
+    row = rows.get(route, Found(f"routes: joint and {route}", 0, 0, 0, 0.0, ""))
+    for what, ratios in misses.items():
+        beyond = int((ratios > 1).sum())
+        row = row._replace(answers=row.answers + ratios.size, beyond=row.beyond + beyond)
+        if ratios.max(initial=0.0) > row.worst:
+            worst = float(ratios.max())
+            row = row._replace(worst=worst, where=f"{what}: {question!r}")
+    rows[route] = row
 
 
 @click.command()
