@@ -26,7 +26,6 @@ from mbma_tables.cli import main
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.materials import METALS
-from mbma_tables.quantities.registry import registry
 from mbma_tables.theories import Mbma
 
 # relative: numbers pass through decimals, powers of ten of units and an inversion
@@ -334,20 +333,14 @@ def by_spellings(reference: Reference) -> Misses:
         scale = {"GPa": 1.0, "MPa": 1e3}[unit]
         plain = joint.at_pressure(reference.pressures * scale)
         for route, answer in (("texts", pressed), ("numbers", plain)):
-            values = {
-                name: np.asarray(answer.quantity(name))
-                / (scale if _has_stress(name) else 1.0)
-                for name in reference.names
-            }
+            values = {}
+            for name in reference.names:
+                same_unit = answer.units[name] == reference.answer.units[name]
+                values[name] = answer.quantity(name) / (1.0 if same_unit else scale)
             misses = reference.ratios(values, 1e-11)
             misses |= reference.statements(answer.valid, answer.reasons)
             found |= {f"{label}, {route}: {name}": row for name, row in misses.items()}
     return found
-
-
-def _has_stress(name: str) -> bool:
-    """Whether the unit of a quantity contains that of stress."""
-    return bool(registry()[name].dimension.stress)
 
 
 def by_table(reference: Reference) -> Misses:
