@@ -19,8 +19,8 @@ import numpy as np
 from scipy.special import erf
 
 from mbma_tables import Bodies, Surface, contact, contact_law, greenwood_tripp, open_table
-from mbma_tables.theories.mbma.geometry import geometry
-from mbma_tables.theories.mbma.variants import get_variant
+from mbma_tables.islands.geometry import geometry
+from mbma_tables.islands.variants import get_variant
 
 MANY = 100_000
 SURFACES = 2_000

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, island, open_table
+from mbma_tables.islands.island_models import IslandAnswer
 from mbma_tables.theories import Mbma
-from mbma_tables.theories.mbma.island_models import IslandAnswer
 from mbma_tables.theories.mbma.tables import shipped
 
 

@@ -37,6 +37,7 @@ from mbma_tables import theories
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.data import FILE
+from mbma_tables.islands.variants import REPORTED, Variant
 from mbma_tables.theories.calibrated.formulas import (
     CONSTANTS,
     YANG_PERSSON,
@@ -44,7 +45,6 @@ from mbma_tables.theories.calibrated.formulas import (
     Spectrum,
 )
 from mbma_tables.theories.calibrated.map_curves import MAP_CONSTANTS
-from mbma_tables.theories.mbma.variants import REPORTED, Variant
 
 # A/A0 of the simulations between which distances are summed up
 LOW = 0.01

@@ -28,12 +28,12 @@ GEOMETRY_SOURCES = (
     "mbma_tables/core/quintic.h",
 )
 SOLVER = (
-    "mbma_tables.theories.mbma.half_space",
-    "mbma_tables.theories.mbma.greenwood_tripp",
+    "mbma_tables.islands.half_space",
+    "mbma_tables.islands.greenwood_tripp",
 )
 GEOMETRY = (
     "mbma_tables.surfaces.spectrum",
-    "mbma_tables.theories.mbma.geometry",
+    "mbma_tables.islands.geometry",
     "mbma_tables.theories.mbma.island4d",
 )
 MODULES = {

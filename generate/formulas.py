@@ -30,10 +30,10 @@ from generate.files import ROOT
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file
-from mbma_tables.theories.mbma import greenwood_tripp
+from mbma_tables.islands import greenwood_tripp
+from mbma_tables.islands.island_models import Certificate
 from mbma_tables.theories.mbma.closed_form_certificates import RANGES
 from mbma_tables.theories.mbma.closed_forms import FUNCTIONS, Function, Steps, evaluate
-from mbma_tables.theories.mbma.island_models import Certificate
 
 FORMS = ROOT / "mbma_tables" / "theories" / "mbma" / "closed_forms.toml"
 MODULE = ROOT / "mbma_tables" / "theories" / "mbma" / "closed_form_certificates.py"

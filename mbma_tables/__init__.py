@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from mbma_tables.contacts.film import flow_factors as flow_factors
     from mbma_tables.contacts.result import Contact as Contact
     from mbma_tables.contacts.sensitivity import sensitivity as sensitivity
+    from mbma_tables.islands import greenwood_tripp as greenwood_tripp
     from mbma_tables.joint import Joint as Joint
     from mbma_tables.law.law import ContactLaw as ContactLaw
     from mbma_tables.law.make import contact_law as contact_law
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from mbma_tables.rough_body.rough_contact import rough_contact as rough_contact
     from mbma_tables.scenes.scene import Scene as Scene
     from mbma_tables.surfaces.surface import Surface as Surface
-    from mbma_tables.theories.mbma import greenwood_tripp as greenwood_tripp
     from mbma_tables.theories.mbma.island import Island as Island
     from mbma_tables.theories.mbma.island import island as island
     from mbma_tables.theories.mbma.tables import open_table as open_table
@@ -56,7 +56,7 @@ _HOMES = {
     "rough_contact": "mbma_tables.rough_body.rough_contact",
     "sensitivity": "mbma_tables.contacts.sensitivity",
     # modules
-    "greenwood_tripp": "mbma_tables.theories.mbma.greenwood_tripp",
+    "greenwood_tripp": "mbma_tables.islands.greenwood_tripp",
     "theories": "mbma_tables.theories",
 }
 

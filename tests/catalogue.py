@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from mbma_tables import Surface
-from mbma_tables.theories.mbma.variants import PRINTED, REPORTED
+from mbma_tables.islands.variants import PRINTED, REPORTED
 
 # variants of one's own: other numbers, and other formulas
 OWN = dataclasses.replace(

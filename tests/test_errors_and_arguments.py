@@ -29,9 +29,9 @@ from mbma_tables.common.errors import (
     NotSelfAffineError,
     OutOfRangeError,
 )
+from mbma_tables.islands.greenwood_tripp import height_integral
 from mbma_tables.materials import effective_modulus
 from mbma_tables.theories import Mbma
-from mbma_tables.theories.mbma.greenwood_tripp import height_integral
 
 
 def test_one_base_and_the_builtin_kinds():

@@ -9,9 +9,9 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from mbma_tables import Surface, contact, contact_law, island
+from mbma_tables.islands.island_models import ISLAND_MODELS
+from mbma_tables.islands.variants import VARIANTS
 from mbma_tables.theories import Mbma
-from mbma_tables.theories.mbma.island_models import ISLAND_MODELS
-from mbma_tables.theories.mbma.variants import VARIANTS
 
 EPS = np.finfo(float).eps
 

@@ -23,11 +23,11 @@ from generate.tables.exact_geometry import DOUBLES, divisor, exact_island
 from generate.tables.height_coefficients import height_integral
 from mbma_tables import Surface, contact, greenwood_tripp
 from mbma_tables.common.errors import MbmaError
+from mbma_tables.islands.geometry import geometry, kinks
+from mbma_tables.islands.island_models import answer_islands
+from mbma_tables.islands.variants import get_variant
 from mbma_tables.theories import Mbma
-from mbma_tables.theories.mbma.geometry import geometry, kinks
-from mbma_tables.theories.mbma.island_models import answer_islands
 from mbma_tables.theories.mbma.tables import get_model
-from mbma_tables.theories.mbma.variants import get_variant
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,7 +11,7 @@ from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.common.table_schema import FUNCTIONS, TableContent, check_content
-from mbma_tables.theories.mbma import greenwood_tripp
+from mbma_tables.islands import greenwood_tripp
 
 CONFORMANCE_POINTS = 64
 CONFORMANCE_TOLERANCE = 1e-11

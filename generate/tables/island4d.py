@@ -36,16 +36,16 @@ from mbma_tables.common.table_schema import (
     TableContent,
 )
 from mbma_tables.core import core
+from mbma_tables.islands import greenwood_tripp
+from mbma_tables.islands.geometry import geometry
+from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.surfaces.spectrum import BROADENING
-from mbma_tables.theories.mbma import greenwood_tripp
-from mbma_tables.theories.mbma.geometry import geometry
 from mbma_tables.theories.mbma.island4d import (
     SPHERE_FLOOR,
     band_fields,
     core_table,
     to_axes,
 )
-from mbma_tables.theories.mbma.variants import Variant, get_variant
 
 VISITED = {
     "hurst": (0.3, 1.0),

@@ -25,10 +25,10 @@ from mbma_tables.common.table_schema import (
     X_STEPS,
     TableContent,
 )
-from mbma_tables.theories.mbma import greenwood_tripp
-from mbma_tables.theories.mbma.geometry import geometry
+from mbma_tables.islands import greenwood_tripp
+from mbma_tables.islands.geometry import geometry
+from mbma_tables.islands.variants import VARIANTS
 from mbma_tables.theories.mbma.universal import TERMS, UniversalModel, fractions_of_mu
-from mbma_tables.theories.mbma.variants import VARIANTS
 
 VISITED = {
     "hurst": (0.05, 1.0),

@@ -14,14 +14,14 @@ import click
 from mbma_tables.bodies import Bodies
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import KINDS
+from mbma_tables.islands.island_models import ISLAND_MODELS
+from mbma_tables.islands.variants import NAMED
 from mbma_tables.scenes import specimen as specimens
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import ROUGHNESS
 from mbma_tables.surfaces.self_affine import CASES
 from mbma_tables.theories import OF_MAPS, THEORIES
-from mbma_tables.theories.mbma.island_models import ISLAND_MODELS
-from mbma_tables.theories.mbma.variants import NAMED
 from mbma_tables.theories.simulated.grids import GRIDS
 
 LOADS = ("separation", "mean_separation", "pressure", "area")

@@ -34,6 +34,7 @@ from mbma_tables.export.text import (
     opening,
     written_by,
 )
+from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1
 from mbma_tables.theories import persson
 from mbma_tables.theories.calibrated import table as calibrated_table
@@ -43,7 +44,6 @@ from mbma_tables.theories.mbma.closed_forms import FUNCTIONS
 from mbma_tables.theories.mbma.sums import QUADRATURE_SHARE
 from mbma_tables.theories.mbma.tables import universal_model
 from mbma_tables.theories.mbma.universal import RECORD, UniversalModel
-from mbma_tables.theories.mbma.variants import Variant, get_variant
 
 CORE = (
     "totals.c",

@@ -13,13 +13,13 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.contacts.contact import contact
 from mbma_tables.export.text import comment, number
+from mbma_tables.islands.geometry import FIELDS, geometry
+from mbma_tables.islands.variants import Variant
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.mbma.closed_forms import FormulaModel
-from mbma_tables.theories.mbma.geometry import FIELDS, geometry
 from mbma_tables.theories.mbma.sums import Sums, by_table
 from mbma_tables.theories.mbma.tables import universal_model
 from mbma_tables.theories.mbma.universal import UniversalModel
-from mbma_tables.theories.mbma.variants import Variant
 
 Rows = Iterator[str]
 FORM = "standard"  # the form of island model "formula"

@@ -20,6 +20,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, factor
 from mbma_tables.export import c_code
 from mbma_tables.export.text import page_file
+from mbma_tables.islands.variants import FITTED, PRINTED, REPORTED, get_variant
 from mbma_tables.materials import hardness_in
 from mbma_tables.quantities.validity import MAX_GRADIENT
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -28,7 +29,6 @@ from mbma_tables.theories import OF_MAPS, default_name, tested
 from mbma_tables.theories.evidence import COMPARED, QUANTITIES, shipped_deviations
 from mbma_tables.theories.mbma import theory as mbma
 from mbma_tables.theories.mbma.tables import universal_model
-from mbma_tables.theories.mbma.variants import FITTED, PRINTED, REPORTED, get_variant
 from mbma_tables.theories.yielding import formulas as hardness_law
 
 MODULE = "explorer.wasm"

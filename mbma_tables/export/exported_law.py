@@ -16,6 +16,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor, in_unit
 from mbma_tables.contacts.contact import contact
 from mbma_tables.export.text import about, number
+from mbma_tables.islands.variants import Variant
 from mbma_tables.law import block as at
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.leakage import LeakageLaw
@@ -30,7 +31,6 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import resolve
 from mbma_tables.theories.base import Theory, UserTheory
-from mbma_tables.theories.mbma.variants import Variant
 
 LAW_RTOL = 1e-8
 LOOKED_AT = 200  # compressions at which validity and scatter are looked at

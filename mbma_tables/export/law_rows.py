@@ -25,12 +25,12 @@ from mbma_tables.export.law_table import (
 )
 from mbma_tables.export.targets import AGAINST
 from mbma_tables.export.text import about, number
+from mbma_tables.islands.variants import Variant
 from mbma_tables.law.law import ROUNDING
 from mbma_tables.quantities.effective_medium import LARGEST_AREA
 from mbma_tables.rough_body.force_law import ForceLaw
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import Theory, UserTheory
-from mbma_tables.theories.mbma.variants import Variant
 from mbma_tables.theories.tested import below, elastic_ranges
 
 FLOWS = {"leakage": 1.0, "hydraulic_aperture": 1 / 3}  # powers of the flow coefficient

@@ -3,7 +3,7 @@
 At the approach delta from where the smooth bodies would touch, with p = law(u), u = r^2/(2
 R) - delta + w, and w the displacement of the half-space under p: the problem of J. A.
 Greenwood and J. H. Tripp (J. Appl. Mech. 34 (1967) 153) with any law. Newton's unknown is w
-at the nodes of `theories.mbma.half_space`. Forces are over E*; a cylinder's are per length.
+at the nodes of `islands.half_space`. Forces are over E*; a cylinder's are per length.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from mbma_tables.common.arguments import FloatArray, Numbers, finite_array, requ
 from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.common.units import SIZES, Units, factor
 from mbma_tables.contacts.result import Setup
+from mbma_tables.islands.half_space import Basis, basis, gauss_legendre, made
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import theory_law
 from mbma_tables.quantities.registry import unit_of
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import Theory, TheoryAnswer
-from mbma_tables.theories.mbma.half_space import Basis, basis, gauss_legendre, made
 
 RTOL = 1e-7  # tolerance of the force of one contact
 NODES = (24, 32, 48, 64, 96, 128, 192, 256, 384, 512)  # numbers of nodes, tried in turn

@@ -23,6 +23,7 @@ from mbma_tables.common.display import Displayed, Variable, quantity, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import new_figure
 from mbma_tables.contacts.contact import contact
+from mbma_tables.islands.half_space import basis
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import contact_law
 from mbma_tables.rough_body.force_law import (
@@ -38,7 +39,6 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import resolve
 from mbma_tables.theories.base import Theory
 from mbma_tables.theories.calibrated.formulas import Spectrum, spectrum_of
-from mbma_tables.theories.mbma.half_space import basis
 
 SHAPES = ("sphere", "cylinder")
 JOHNSON = (

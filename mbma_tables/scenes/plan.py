@@ -21,8 +21,8 @@ import numpy as np
 
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
+from mbma_tables.islands.island_models import AnyModel
 from mbma_tables.scenes.problem import INVERTED, OF_CONTACT, OUTPUTS, REFINEMENTS, Problem
-from mbma_tables.theories.mbma.island_models import AnyModel
 
 TABLES = ("universal", "island4d")  # island models that are tables
 ISLAND_SHARE = 0.5  # share of a step's tolerance; the rest is for its quadrature

@@ -18,12 +18,12 @@ from mbma_tables.common.arguments import (
 )
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, modulus_and_units, require_surface
+from mbma_tables.islands.island_models import ISLAND_MODELS, AnyModel
+from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.materials import hardness_in
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import OF_MAPS, THEORIES, default_name, resolve
 from mbma_tables.theories.base import Theory
-from mbma_tables.theories.mbma.island_models import ISLAND_MODELS, AnyModel
-from mbma_tables.theories.mbma.variants import Variant, get_variant
 
 # effects, described in docs/scenes.md: those that are read from one contact, and others
 OF_CONTACT = (

@@ -19,6 +19,8 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.plots import Curve, theory_label
 from mbma_tables.common.progress import doing
+from mbma_tables.islands.island_models import RigidModel, answer_islands
+from mbma_tables.islands.variants import get_variant
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.quantities.registry import registry, unit_of
 from mbma_tables.scenes.plan import AMPLIFICATION, TABLES, Plan, Step
@@ -27,9 +29,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories import resolve
-from mbma_tables.theories.mbma.island_models import RigidModel, answer_islands
 from mbma_tables.theories.mbma.tables import get_model
-from mbma_tables.theories.mbma.variants import get_variant
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -272,7 +272,7 @@ def island_statistics(run: Run, step: Step) -> None:
 
 def profiles(run: Run, step: Step) -> None:
     """p(r) and d(r) of the islands at these approaches, solved exactly (Eqs. 34, 36, 37)."""
-    from mbma_tables.theories.mbma import greenwood_tripp
+    from mbma_tables.islands import greenwood_tripp
     from mbma_tables.theories.mbma.island import islands_of
 
     assert step.rtol is not None

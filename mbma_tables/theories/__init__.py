@@ -13,12 +13,12 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.shared import shared
 
 if TYPE_CHECKING:
+    from mbma_tables.islands.variants import Variant as Variant
     from mbma_tables.surfaces.any_surface import AnySurface
     from mbma_tables.theories.base import Theory, TheoryAnswer, UserTheory
     from mbma_tables.theories.calibrated.theory import Calibrated
     from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
     from mbma_tables.theories.mbma.theory import Mbma
-    from mbma_tables.theories.mbma.variants import Variant as Variant
     from mbma_tables.theories.persson import Method, Persson
     from mbma_tables.theories.simulated.one_map import BoundaryElements
     from mbma_tables.theories.simulated.theory import Simulated
@@ -54,7 +54,7 @@ NONE: Mapping[str, Any] = types.MappingProxyType({})
 # a theory's module is imported when first needed
 _HOMES = {
     **{made: module for module, made in _NAMED.values()},
-    "Variant": "mbma.variants",
+    "Variant": ".islands.variants",
     "Method": "persson",
     "BoundaryElements": "simulated.one_map",
     "Theory": "base",
@@ -65,7 +65,7 @@ _HOMES = {
 
 def __getattr__(name: str) -> Any:
     if name in _HOMES:
-        return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+        return getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.islands.greenwood_tripp import height_integral
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import EVERYWHERE, Theory, TheoryAnswer
-from mbma_tables.theories.mbma.greenwood_tripp import height_integral
 
 EPSILON = 1e-13  # accuracy of the height integrals
 MAX_DEPTH = (

@@ -415,7 +415,7 @@ def test_a_terminal_sees_that_work_goes_on():
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-@pytest.mark.parametrize("module", ["click", "mbma_tables.theories.mbma.greenwood_tripp"])
+@pytest.mark.parametrize("module", ["click", "mbma_tables.islands.greenwood_tripp"])
 def test_control_c_ends_it_with_130(folder, module):
     # while modules are imported, and with the last of them in place
     command = [

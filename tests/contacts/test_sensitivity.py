@@ -10,9 +10,9 @@ from catalogue import LEVEL, OWN
 from helpers import difference_weights, random_map, refusals, run, sensitivity_of
 
 from mbma_tables import Bodies, InputError, Surface, contact, sensitivity
+from mbma_tables.islands.geometry import kinks
+from mbma_tables.islands.variants import get_variant
 from mbma_tables.theories import THEORIES, Mbma
-from mbma_tables.theories.mbma.geometry import kinks
-from mbma_tables.theories.mbma.variants import get_variant
 
 # each of two flags by itself
 NO_OFFSET = dataclasses.replace(OWN, name="no offset", offset=False)

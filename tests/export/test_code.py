@@ -21,10 +21,10 @@ from mbma_tables.export import c_code, conformance, data, solvers
 from mbma_tables.export.c_code import SELFTEST, SOURCES, check, read_report, write_code
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.text import checked_name
+from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.theories.mbma.closed_form_certificates import RANGES
 from mbma_tables.theories.mbma.tables import universal_model
 from mbma_tables.theories.mbma.universal import UniversalModel
-from mbma_tables.theories.mbma.variants import Variant, get_variant
 
 POINTS = 10_000
 SURFACES = 60

@@ -14,8 +14,8 @@ from mbma_tables import Bodies, InputError, MbmaError, Surface, contact, contact
 from mbma_tables.export import data, law_table, solvers
 from mbma_tables.export.law_rows import FLOOR, describe_law
 from mbma_tables.export.solvers import calculix
+from mbma_tables.islands.variants import PRINTED
 from mbma_tables.theories import THEORIES, Mbma
-from mbma_tables.theories.mbma.variants import PRINTED
 
 UNITS = {"length_unit": "mm", "stress_unit": "MPa"}
 HEAT = {"quantity": "conductance", "conductivity": 50.0, "conductivity_unit": "mW/K"}

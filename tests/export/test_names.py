@@ -25,7 +25,7 @@ from mbma_tables.export.languages import LANGUAGES
 from mbma_tables.export.law_code import asked_law, text_of
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.text import inert
-from mbma_tables.theories.mbma.variants import get_variant
+from mbma_tables.islands.variants import get_variant
 
 ROAD = Surface.named("concrete")
 # comments and texts of all languages end, encodings and editors' settings begin; a terminal

@@ -21,7 +21,7 @@ from generate.tables.configuration import MIN_SHIPPED_POINTS, load
 from generate.tables.writing import write_table
 from mbma_tables.common.netcdf import read_table
 from mbma_tables.common.table_schema import UNIVERSAL
-from mbma_tables.theories.mbma import greenwood_tripp
+from mbma_tables.islands import greenwood_tripp
 from mbma_tables.theories.mbma.tables import shipped
 from mbma_tables.theories.mbma.universal import UniversalModel
 

@@ -9,9 +9,9 @@ from generate.boundary_elements.run import GRIDS
 from generate.files import ROOT, read_csv
 from generate.pages import cost as pages_cost
 from mbma_tables import contact
+from mbma_tables.islands import greenwood_tripp
 from mbma_tables.scenes.plan import read_costs, shipped_costs, shipped_distances
 from mbma_tables.theories import Mbma
-from mbma_tables.theories.mbma import greenwood_tripp
 
 COST = 2.0
 SECONDS = 1e-3

@@ -19,10 +19,10 @@ from mbma_tables import (
 from mbma_tables.export.law_code import law_files, law_text
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.targets import targets
+from mbma_tables.islands.greenwood_tripp import height_integral
 from mbma_tables.rough_body.force_law import plane_basis
 from mbma_tables.rough_body.rough_contact import CELLS
 from mbma_tables.theories import Theory, TheoryAnswer
-from mbma_tables.theories.mbma.greenwood_tripp import height_integral
 
 FACE = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
 

@@ -22,14 +22,14 @@ from mbma_tables import (
     island,
     open_table,
 )
+from mbma_tables.islands.island_models import answer_islands
+from mbma_tables.islands.variants import REPORTED
 from mbma_tables.scenes import plan as plans
 from mbma_tables.scenes import run as runs
 from mbma_tables.scenes.problem import ELASTIC, OF_CONTACT, OUTPUTS
 from mbma_tables.theories import GreenwoodWilliamson, Mbma, Persson
 from mbma_tables.theories.mbma.island import scale_area
-from mbma_tables.theories.mbma.island_models import answer_islands
 from mbma_tables.theories.mbma.profile import source_of
-from mbma_tables.theories.mbma.variants import REPORTED
 from mbma_tables.theories.yielding.theory import Yielding
 
 CONCRETE = Surface.named("concrete")

@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbma_tables import OutOfRangeError, Surface
+from mbma_tables.islands.variants import PRINTED, REPORTED, VARIANTS, get_variant
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.self_affine import CASES
-from mbma_tables.theories.mbma.variants import PRINTED, REPORTED, VARIANTS, get_variant
 
 GOOD = {"hurst": 0.8, "q0": 0.5, "q1": 100.0, "h_rms": 0.2, "h_max": 0.6}
 

@@ -5,7 +5,7 @@ Made by `python -m generate formulas`; do not edit.
 
 # fmt: off
 
-from mbma_tables.theories.mbma.island_models import Certificate
+from mbma_tables.islands.island_models import Certificate
 
 RANGES: dict[str, dict[str, tuple[float, float]]] = {
     "pocket": {"X": (0.8, 25.0), "mu": (0.0, 2000.0)},

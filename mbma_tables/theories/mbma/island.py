@@ -20,16 +20,16 @@ from mbma_tables.common.arguments import (
 )
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import modulus_and_units
-from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.surface import MeasuredSurface, Surface
-from mbma_tables.theories.mbma.geometry import geometry, measured_islands
-from mbma_tables.theories.mbma.island_models import (
+from mbma_tables.islands.geometry import geometry, measured_islands
+from mbma_tables.islands.island_models import (
     AnyModel,
     answer_islands,
     island_model_name,
 )
+from mbma_tables.islands.variants import Variant, get_variant
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories.mbma.tables import get_model
-from mbma_tables.theories.mbma.variants import Variant, get_variant
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

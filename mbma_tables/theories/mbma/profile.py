@@ -23,19 +23,19 @@ from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.core import core
-from mbma_tables.surfaces.spectrum import Place
-from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.theories.mbma.geometry import (
+from mbma_tables.islands.geometry import (
     floors_of,
     geometry,
     kinks,
     measured_islands,
     s_over_h_rms,
 )
+from mbma_tables.islands.island_models import AnyModel, answer_islands
+from mbma_tables.islands.variants import Variant
+from mbma_tables.surfaces.spectrum import Place
+from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.mbma.island import refuse_bands, scale_area, scale_force
-from mbma_tables.theories.mbma.island_models import AnyModel, answer_islands
 from mbma_tables.theories.mbma.universal import UniversalModel
-from mbma_tables.theories.mbma.variants import Variant
 
 NODES = 16  # nodes of a panel, MBMA_PANEL_NODES of mbma.h
 GAPS = 10  # largest number of gaps of a panel: a series has 2 GAPS terms

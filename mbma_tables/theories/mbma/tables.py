@@ -19,12 +19,12 @@ from mbma_tables.common.table_schema import (
     UNIVERSAL,
     TableContent,
 )
-from mbma_tables.theories.mbma import greenwood_tripp
-from mbma_tables.theories.mbma import island_models as models
+from mbma_tables.islands import greenwood_tripp
+from mbma_tables.islands import island_models as models
+from mbma_tables.islands.island_models import AnyModel
+from mbma_tables.islands.variants import Variant
 from mbma_tables.theories.mbma.island4d import Island4dModel, to_axes
-from mbma_tables.theories.mbma.island_models import AnyModel
 from mbma_tables.theories.mbma.universal import UniversalModel
-from mbma_tables.theories.mbma.variants import Variant
 
 
 def shipped(kind: str) -> pathlib.Path:

@@ -11,6 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from mbma_tables.common.arguments import FloatArray, require
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.shared import shared_property
+from mbma_tables.islands.geometry import kinks
+from mbma_tables.islands.island_models import (
+    MIN_RTOL,
+    AnyModel,
+    check_outside,
+    island_model_name,
+)
+from mbma_tables.islands.variants import NAMED, get_variant
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories.base import (
@@ -23,18 +31,10 @@ from mbma_tables.theories.base import (
     select,
 )
 from mbma_tables.theories.inversion import Curve
-from mbma_tables.theories.mbma.geometry import kinks
 from mbma_tables.theories.mbma.island import check_band
-from mbma_tables.theories.mbma.island_models import (
-    MIN_RTOL,
-    AnyModel,
-    check_outside,
-    island_model_name,
-)
 from mbma_tables.theories.mbma.profile import profile
 from mbma_tables.theories.mbma.sums import QUADRATURE_SHARE, Sums, Totals, totals_at
 from mbma_tables.theories.mbma.tables import get_model
-from mbma_tables.theories.mbma.variants import NAMED, get_variant
 
 SCAN = 49  # compressions at which force, area and stiffness are searched for a maximum
 # leading powers of h_max - d of force and area

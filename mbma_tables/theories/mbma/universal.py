@@ -20,7 +20,7 @@ from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.shared import shared_property
 from mbma_tables.common.table_schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
 from mbma_tables.core import core
-from mbma_tables.theories.mbma.island_models import (
+from mbma_tables.islands.island_models import (
     OUTSIDE,
     SOLVER,
     IslandAnswer,

@@ -27,6 +27,7 @@ from mbma_tables import (
     contact_law,
 )
 from mbma_tables.common.files import shipped_file
+from mbma_tables.islands.variants import get_variant
 from mbma_tables.surfaces.bearing_curve import QUANTILES
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.surface import MeasuredSurface
@@ -40,7 +41,6 @@ from mbma_tables.theories.calibrated.formulas import (
 from mbma_tables.theories.calibrated.map_curves import MAP_CONSTANTS, hertz_ellipse
 from mbma_tables.theories.calibrated.table import load, shipped
 from mbma_tables.theories.evidence import NAME, QUANTITIES, shipped_deviations
-from mbma_tables.theories.mbma.variants import get_variant
 
 DATA = pathlib.Path(__file__).parents[3] / "docs" / "data"
 THEORY = Calibrated()

@@ -13,9 +13,9 @@ from mbma_tables import (
     contact,
     greenwood_tripp,
 )
+from mbma_tables.islands.geometry import geometry, kinks
+from mbma_tables.islands.variants import get_variant
 from mbma_tables.theories import Mbma
-from mbma_tables.theories.mbma.geometry import geometry, kinks
-from mbma_tables.theories.mbma.variants import get_variant
 
 
 def brute(surface, separation, variant):

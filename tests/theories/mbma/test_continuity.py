@@ -14,12 +14,12 @@ from helpers import SCALE, difference_weights, with_slopes
 
 from mbma_tables import Surface, contact_law, greenwood_tripp
 from mbma_tables.core import core
+from mbma_tables.islands.geometry import kinks
+from mbma_tables.islands.greenwood_tripp import height_integral
+from mbma_tables.islands.variants import VARIANTS, get_variant
 from mbma_tables.law.block import CENTRE, RATE
 from mbma_tables.theories import Mbma
-from mbma_tables.theories.mbma.geometry import kinks
-from mbma_tables.theories.mbma.greenwood_tripp import height_integral
 from mbma_tables.theories.mbma.tables import universal_model
-from mbma_tables.theories.mbma.variants import VARIANTS, get_variant
 
 STEP = 1e-9
 FAR = 1e-5

@@ -9,7 +9,8 @@ from small_tables import small_table
 
 from mbma_tables import InputError, OutOfRangeError, greenwood_tripp
 from mbma_tables.common.table_schema import ISLAND4D
-from mbma_tables.theories.mbma.geometry import geometry
+from mbma_tables.islands.geometry import geometry
+from mbma_tables.islands.variants import REPORTED
 from mbma_tables.theories.mbma.island import scale_area, scale_force
 from mbma_tables.theories.mbma.island4d import (
     SPHERE_FLOOR,
@@ -18,7 +19,6 @@ from mbma_tables.theories.mbma.island4d import (
     to_axes,
 )
 from mbma_tables.theories.mbma.tables import open_table
-from mbma_tables.theories.mbma.variants import REPORTED
 
 
 @pytest.fixture(scope="module")

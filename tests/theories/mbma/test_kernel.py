@@ -8,11 +8,11 @@ from catalogue import LEVEL
 
 from mbma_tables import ConvergenceError, Surface, contact
 from mbma_tables.core import INVALID, OK, UNRESOLVED, core
+from mbma_tables.islands.geometry import FIELDS, geometry
+from mbma_tables.islands.variants import PRINTED, REPORTED
 from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma import sums as sums
-from mbma_tables.theories.mbma.geometry import FIELDS, geometry
 from mbma_tables.theories.mbma.tables import universal_model
-from mbma_tables.theories.mbma.variants import PRINTED, REPORTED
 
 
 @pytest.mark.parametrize(

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law, island
+from mbma_tables.islands.island_models import answer_islands
+from mbma_tables.islands.variants import FITTED, PRINTED, REPORTED
 from mbma_tables.theories import Mbma
-from mbma_tables.theories.mbma.island_models import answer_islands
 from mbma_tables.theories.mbma.profile import profile, source_of
 from mbma_tables.theories.mbma.tables import get_model
-from mbma_tables.theories.mbma.variants import FITTED, PRINTED, REPORTED
 
 DATA = pathlib.Path(__file__).parents[2] / "data"
 DEPTHS = np.array([1e-9, 1e-4, 0.02, 0.3, 1.0, 1.5, 2.0])  # (h_max - d)/h_max

@@ -12,9 +12,9 @@ from generate.splines import coefficients, padding
 from mbma_tables.common.arguments import filled
 from mbma_tables.common.table_schema import Axis
 from mbma_tables.core import core
-from mbma_tables.theories.mbma import greenwood_tripp
+from mbma_tables.islands import greenwood_tripp
+from mbma_tables.islands.variants import REPORTED
 from mbma_tables.theories.mbma.island4d import core_table
-from mbma_tables.theories.mbma.variants import REPORTED
 
 SHAPE = (9, 8, 7, 6)
 

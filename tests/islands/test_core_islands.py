@@ -11,12 +11,12 @@ import scipy.special
 
 from mbma_tables import InputError
 from mbma_tables.core import core
-from mbma_tables.theories.mbma.greenwood_tripp import (
+from mbma_tables.islands.greenwood_tripp import (
     COARSE_NODES,
     ORDERS,
     height_integral,
 )
-from mbma_tables.theories.mbma.half_space import basis
+from mbma_tables.islands.half_space import basis
 
 OK = 0
 UNRESOLVED = 4

@@ -11,10 +11,10 @@ from catalogue import random_surfaces
 
 from generate.tables.exact_geometry import DIGITS, divisor, exact_island
 from mbma_tables import OutOfRangeError, Surface, greenwood_tripp, island
+from mbma_tables.islands.geometry import FIELDS, geometry
+from mbma_tables.islands.variants import PRINTED, REPORTED, VARIANTS
 from mbma_tables.surfaces.spectrum import BROADENING
-from mbma_tables.theories.mbma.geometry import FIELDS, geometry
 from mbma_tables.theories.mbma.island4d import band_fields
-from mbma_tables.theories.mbma.variants import PRINTED, REPORTED, VARIANTS
 
 
 def one_geometry(approach, hurst, zeta_1, variant):

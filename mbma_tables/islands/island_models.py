@@ -8,7 +8,7 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError, OutOfRangeError
-from mbma_tables.theories.mbma import greenwood_tripp
+from mbma_tables.islands import greenwood_tripp
 
 ISLAND_MODELS = ("exact", "universal", "island4d", "formula", "rigid")
 OUTSIDE = ("raise", "exact", "nan")  # options for islands that a table does not cover
@@ -66,7 +66,7 @@ class GeometryModel(Protocol):
     def of_islands(
         self, islands: Mapping[str, FloatArray], outside: str = "raise"
     ) -> IslandAnswer:
-        """Phi_F and Phi_A of islands, given as `theories.mbma.geometry.FIELDS` and hurst, arrays of one shape.
+        """Phi_F and Phi_A of islands, given as `islands.geometry.FIELDS` and hurst, arrays of one shape.
 
         `outside` is one of `OUTSIDE`. Used in place of `answer` where both exist.
         """

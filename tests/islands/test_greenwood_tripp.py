@@ -20,9 +20,9 @@ from mbma_tables import (
     OutOfRangeError,
     greenwood_tripp,
 )
-from mbma_tables.theories.mbma.greenwood_tripp import height_integral
+from mbma_tables.islands.greenwood_tripp import height_integral
 
-PUBLISHED = pathlib.Path(__file__).parents[2] / "data" / "greenwood_tripp.csv"
+PUBLISHED = pathlib.Path(__file__).parents[1] / "data" / "greenwood_tripp.csv"
 
 approaches = st.floats(-6, 40)
 stiffnesses = st.floats(-14, 8).map(lambda power: 10**power)
@@ -228,7 +228,7 @@ OTHERS = pytest.mark.skipif(
 @pytest.fixture(scope="module")
 def theirs():
     """The function of the notebook that compares both programs."""
-    page = pathlib.Path(__file__).parents[3] / "docs" / "tutorials" / "other_program.md"
+    page = pathlib.Path(__file__).parents[2] / "docs" / "tutorials" / "other_program.md"
     names = {}
     exec(
         page.read_text(encoding="utf-8")

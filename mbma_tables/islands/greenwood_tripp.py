@@ -27,7 +27,7 @@ from mbma_tables.common.arguments import (
 from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.core import core
-from mbma_tables.theories.mbma.half_space import basis
+from mbma_tables.islands.half_space import basis
 
 ORDERS = (0.5, 1.0, 1.5, 2.0, 2.5)  # of height integrals
 LEVELS = np.array(
@@ -137,7 +137,7 @@ def height_integral(n: float, x: ArrayLike) -> Any:
 
     Examples
     --------
-    >>> from mbma_tables.theories.mbma.greenwood_tripp import height_integral
+    >>> from mbma_tables.islands.greenwood_tripp import height_integral
     >>> height_integral(1.5, [-1.0, 0.0, 1.0]).round(6)
     array([1.404597, 0.43002 , 0.075668])
     """

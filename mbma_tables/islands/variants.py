@@ -32,7 +32,7 @@ class Variant:
     >>> import dataclasses
     >>> from mbma_tables import Surface, contact
     >>> from mbma_tables.theories import Mbma
-    >>> from mbma_tables.theories.mbma.variants import PRINTED
+    >>> from mbma_tables.islands.variants import PRINTED
     >>> flat = dataclasses.replace(PRINTED, name="no offset", offset=False)
     >>> contact(Surface.named("concrete"), separation=0.6, theory=Mbma(variant=flat)).variant
     'no offset'

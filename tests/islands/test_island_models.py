@@ -22,8 +22,8 @@ from mbma_tables import (
     greenwood_tripp,
     island,
 )
+from mbma_tables.islands.variants import REPORTED, VARIANTS
 from mbma_tables.theories import Mbma
-from mbma_tables.theories.mbma.variants import REPORTED, VARIANTS
 
 SHALLOW = dataclasses.replace(REPORTED, name="shallow", beta=0.01, phi=0.001)
 OPEN = dataclasses.replace(
@@ -214,7 +214,7 @@ def test_what_is_nearly_nothing_ends_and_states_its_digits(island_model):
     assert found.error[2] > 1e-7
 
 
-DATA = pathlib.Path(__file__).parents[3] / "docs" / "data" / "boundary_elements.csv"
+DATA = pathlib.Path(__file__).parents[2] / "docs" / "data" / "boundary_elements.csv"
 COVER = dataclasses.replace(REPORTED, name="cover", addition="cover")
 COVERED = Surface(0.8, 0.01, 2.0, 1.0, 3.0)
 COVERED_GAPS = np.array([2.9, 2.0, 0.5, -1.0, -2.9])
@@ -277,7 +277,7 @@ def test_fitted_area_at_equal_force_follows_boundary_elements():
     assert abs(np.mean(errors)) < 0.02
 
 
-ROOT = pathlib.Path(__file__).parents[3]
+ROOT = pathlib.Path(__file__).parents[2]
 FLAT = Surface(0.8, 0.3, 60.0, 0.7, 2.1)
 OWN_GAPS = np.array([2.09, 1.0, -1.5, 2.5])
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
+from mbma_tables.islands.variants import Variant
 from mbma_tables.surfaces.spectrum import (
     BROADENING,
     RADIUS,
@@ -32,7 +33,6 @@ from mbma_tables.surfaces.spectrum import (
     summit_rate,
 )
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.theories.mbma.variants import Variant
 
 # of an island in units of s and 1/q0: zeta_d (27), zeta_u (30), R_d (26), R_u (29), D and
 # sigma (32), h_d (B.3), h_u (B.12), eta (39), X = (h_rms/s delta/h_rms - h_d)/sigma, mu =
@@ -186,7 +186,7 @@ def floors_of(surface: MeasuredSurface, variant: Variant) -> Floors:
 def measured_islands(
     surface: MeasuredSurface, delta: FloatArray, variant: Variant
 ) -> dict[str, FloatArray]:
-    """`theories.mbma.geometry.FIELDS` of islands at approaches delta > 0 [length], in powers of length."""
+    """`islands.geometry.FIELDS` of islands at approaches delta > 0 [length], in powers of length."""
     laws = surface.laws
     floors = floors_of(surface, variant)
 
