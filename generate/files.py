@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.common.table_schema import ISLAND4D, UNIVERSAL
 from mbma_tables.core import ARITHMETIC
 from mbma_tables.data import FILE, boundary_elements
+from mbma_tables.tables.schema import ISLAND4D, UNIVERSAL
 
 ROOT = pathlib.Path(__file__).parents[1]
 DATA = ROOT / "docs" / "data"

@@ -32,8 +32,8 @@ from generate.calibrated_file import (
     write_part,
 )
 from generate.splines import coefficients
-from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.workers import results
 from mbma_tables.data import FILE
 from mbma_tables.quantities import effective_medium as leakage
 from mbma_tables.quantities.effective_medium import FlowConstants

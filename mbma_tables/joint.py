@@ -22,6 +22,7 @@ from mbma_tables.common.arguments import (
 from mbma_tables.common.display import Displayed, Variable, dataset_of, saved
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.plots import draw_panels
+from mbma_tables.common.toml_files import read_toml
 from mbma_tables.common.units import (
     HEAT_CONDUCTANCE,
     Units,
@@ -47,7 +48,6 @@ from mbma_tables.quantities.tangential import (
     checked_friction,
     ratio_on,
 )
-from mbma_tables.scenes.specimen import read_toml
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import TOPS
 from mbma_tables.surfaces.surface import Surface, assumptions

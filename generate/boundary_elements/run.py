@@ -41,11 +41,11 @@ from generate.boundary_elements.surfaces import (
 )
 from generate.calibrated_file import Variable, attributes, rms, variable, write_part
 from generate.timing import seconds_of_work
-from generate.workers import results
 from mbma_tables import Bodies, Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.common.files import write_file
+from mbma_tables.common.workers import results
 from mbma_tables.data import FILE
 from mbma_tables.quantities.gas import mean_inverse
 from mbma_tables.surfaces.bearing_curve import FRACTIONS, QUANTILES, bearing

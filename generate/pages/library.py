@@ -24,16 +24,16 @@ from generate.distances import pocket_errors
 from generate.files import ROOT
 from generate.page import Cell, Measured, duration, panels, table
 from mbma_tables import Surface, contact
-from mbma_tables.common.netcdf import read_table
 from mbma_tables.common.plots import draw_compression, theory_label
-from mbma_tables.common.table_schema import (
+from mbma_tables.scenes.plan import shipped_costs, shipped_distances
+from mbma_tables.tables.reader import read_table
+from mbma_tables.tables.schema import (
     CELL_EDGES,
     ISLAND4D,
     KINDS,
     UNIVERSAL,
     TableContent,
 )
-from mbma_tables.scenes.plan import shipped_costs, shipped_distances
 from mbma_tables.theories import THEORIES
 from mbma_tables.theories.mbma.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.theories.mbma.closed_forms import FUNCTIONS, Function

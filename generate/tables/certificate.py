@@ -7,11 +7,11 @@ import numpy as np
 from scipy.stats import qmc
 
 from generate.tables.configuration import Configuration
-from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
-from mbma_tables.common.table_schema import FUNCTIONS, TableContent, check_content
+from mbma_tables.common.workers import results
 from mbma_tables.islands import greenwood_tripp
+from mbma_tables.tables.schema import FUNCTIONS, TableContent, check_content
 
 CONFORMANCE_POINTS = 64
 CONFORMANCE_TOLERANCE = 1e-11

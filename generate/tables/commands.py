@@ -12,7 +12,7 @@ from generate.tables.island4d import Island4d
 from generate.tables.universal import Universal
 from generate.tables.writing import write_table
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.table_schema import ISLAND4D, UNIVERSAL
+from mbma_tables.tables.schema import ISLAND4D, UNIVERSAL
 
 TABLES = ROOT / "tables"
 KINDS: dict[str, type[Universal | Island4d]] = {UNIVERSAL: Universal, ISLAND4D: Island4d}

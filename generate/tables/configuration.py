@@ -11,9 +11,9 @@ import numpy as np
 from generate.tables.writing import TEXTS
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.netcdf import digest_json
-from mbma_tables.common.table_schema import AXES, DEGREE, ISLAND4D, Axis
+from mbma_tables.common.toml_files import check, read_toml
 from mbma_tables.islands.variants import get_variant
-from mbma_tables.scenes.specimen import check, read_toml
+from mbma_tables.tables.schema import AXES, DEGREE, ISLAND4D, Axis
 
 HERE = pathlib.Path(__file__).parent
 # ranges within which the solver reaches its tightest tolerance, whatever the other axes

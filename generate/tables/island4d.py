@@ -28,18 +28,18 @@ from generate.tables.certificate import (
 )
 from generate.tables.writing import TEXTS, about, label
 from mbma_tables.common.arguments import FloatArray, filled
-from mbma_tables.common.table_schema import (
+from mbma_tables.core import core
+from mbma_tables.islands import greenwood_tripp
+from mbma_tables.islands.geometry import geometry
+from mbma_tables.islands.variants import Variant, get_variant
+from mbma_tables.surfaces.spectrum import BROADENING
+from mbma_tables.tables.schema import (
     DEGREE,
     FUNCTIONS,
     ISLAND4D,
     Axis,
     TableContent,
 )
-from mbma_tables.core import core
-from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.geometry import geometry
-from mbma_tables.islands.variants import Variant, get_variant
-from mbma_tables.surfaces.spectrum import BROADENING
 from mbma_tables.theories.mbma.island4d import (
     SPHERE_FLOOR,
     band_fields,

@@ -16,18 +16,18 @@ from generate.tables.certificate import (
     phi,
 )
 from generate.tables.writing import about, label
-from generate.workers import results
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.table_schema import (
+from mbma_tables.common.workers import results
+from mbma_tables.islands import greenwood_tripp
+from mbma_tables.islands.geometry import geometry
+from mbma_tables.islands.variants import VARIANTS
+from mbma_tables.tables.schema import (
     BUCKET_BITS,
     CELL_EDGES,
     UNIVERSAL,
     X_STEPS,
     TableContent,
 )
-from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.geometry import geometry
-from mbma_tables.islands.variants import VARIANTS
 from mbma_tables.theories.mbma.universal import TERMS, UniversalModel, fractions_of_mu
 
 VISITED = {

@@ -11,11 +11,11 @@ import netCDF4
 import numpy as np
 
 from generate.files import MODULES, source_digest, versions
-from mbma_tables.common import table_schema as schema
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import write_file, written_bytes
 from mbma_tables.common.netcdf import HDF5_LOCK, SEAL, attributes_digest, digest_arrays
-from mbma_tables.common.table_schema import check_content
+from mbma_tables.tables import schema as schema
+from mbma_tables.tables.schema import check_content
 
 CONVENTIONS = "CF-1.11"
 ANSWERS = {schema.UNIVERSAL: "Phi_{f}", schema.ISLAND4D: "{f}_hat"}

@@ -10,9 +10,10 @@ import click
 from mbma_tables.cli.options import json_option
 from mbma_tables.common import cache
 from mbma_tables.common.errors import InputError, TableFileError
-from mbma_tables.common.netcdf import OWN, OWN_REMEDY, holds_own, read_own, read_table
+from mbma_tables.common.netcdf import OWN, OWN_REMEDY, holds_own, read_own
 from mbma_tables.common.progress import echo
-from mbma_tables.common.table_schema import KINDS, UNIVERSAL
+from mbma_tables.tables.reader import read_table
+from mbma_tables.tables.schema import KINDS, UNIVERSAL
 
 FAITHFUL = 1e-6  # relative, of an own table's curves at the loads they go through
 

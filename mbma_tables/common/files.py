@@ -23,7 +23,7 @@ ABANDONED = 3600.0  # s, age from which on a draft is no longer being written
 def shipped_file(name: str) -> pathlib.Path:
     """Path of a file of `tables`: in the installed package, or in a checkout's `tables` folder."""
     package = pathlib.Path(__file__).parents[1]
-    inside = package / "tables" / name
+    inside = package / "tables" / "data" / name
     return inside if inside.exists() else package.parent / "tables" / name
 
 

@@ -1,4 +1,4 @@
-"""Open and check table files (netCDF-4); write those of a user's own surface.
+"""Open and check sealed files (netCDF-4); write those of a user's own surface.
 
 A file ends in a line with the SHA-256 of all bytes before it, which is checked before the
 HDF5 library opens the file, since that may crash on damaged bytes. HDF5 ignores what
@@ -12,20 +12,20 @@ import hashlib
 import json
 import os
 import pathlib
+import re
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbma_tables.common import table_schema as schema
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import read_file, write_file, written_bytes
 
 if TYPE_CHECKING:
     import netCDF4
 
-REMEDY = "rebuild it with `python -m generate tables {}` or reinstall mbma_tables"
+REMEDY = "reinstall mbma_tables"
 # tables of a user's own surface, BEM results of one map
 OWN = "simulated_map"
 OWN_FORMAT = "2.0"
@@ -41,6 +41,45 @@ if hasattr(os, "register_at_fork"):
         after_in_parent=HDF5_LOCK.release,
         after_in_child=HDF5_LOCK.release,
     )
+
+
+# the first pattern that matches a name determines the type of the attribute
+ATTRIBUTES: tuple[tuple[str, type, Callable[[Any], Any], str], ...] = (
+    (
+        "certificate_points|spline_degree",
+        int,
+        lambda value: value > 0,
+        "a whole number above 0",
+    ),
+    (
+        "target|.*_error_[FA]",
+        float,
+        lambda value: 0 <= value < np.inf,
+        "a finite number, at least 0",
+    ),
+    ("offset|first|last", float, np.isfinite, "a finite number"),
+    (".*_sha256", str, re.compile("[0-9a-f]{64}").fullmatch, "64 hexadecimal digits"),
+    ("data_version", str, re.compile("[0-9a-f]{12}").fullmatch, "12 hexadecimal digits"),
+    (
+        "variant|mbma_kind|transform",
+        str,
+        re.compile("[A-Za-z][A-Za-z0-9_]{0,39}").fullmatch,
+        "a name",
+    ),
+    (".*", str, str.isprintable, "printable text"),
+)
+
+
+def check_attribute(owner: str, name: str, value: Any) -> None:
+    """Raise ValueError if an attribute does not have its type; `owner` is empty for a file."""
+    expected, good, text = next(
+        row[1:] for row in ATTRIBUTES if re.fullmatch(row[0], name)
+    )
+    if type(value) is not expected or not good(value):
+        shown = repr(value)[:60]
+        raise ValueError(
+            f"has attribute {owner + ':' if owner else ''}{name} = {shown}, which must be {text}"
+        )
 
 
 def digest_json(content: Any) -> str:
@@ -89,7 +128,7 @@ def attributes_digest(dataset: netCDF4.Dataset) -> str:
     return digest_json(content)
 
 
-def read_sealed(path: pathlib.Path, remedy: str = REMEDY.format("all")) -> bytes:
+def read_sealed(path: pathlib.Path, remedy: str = REMEDY) -> bytes:
     """The netCDF bytes of a table file, checked against its checksum."""
     try:
         content = read_file(path, MAX_BYTES)
@@ -144,7 +183,7 @@ def verified(
     }
     for owner, attributes in {"": attributes_of_file, **described}.items():
         for name, value in attributes.items():
-            schema.check_attribute(owner, name, value)
+            check_attribute(owner, name, value)
     for name, variable in dataset.variables.items():
         if variable.dtype != np.dtype("<f8"):
             raise ValueError(
@@ -173,65 +212,6 @@ def verified(
     if digest_arrays(values) != attributes_of_file["values_sha256"]:
         raise ValueError("has values that do not match their hash")
     return attributes_of_file, described, values
-
-
-def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
-    """The table in an open file of known kind and format."""
-    attributes_of_file, described, values = verified(dataset, schema.REQUIRED)
-    names = [name for name, _ in schema.AXES[kind]]
-    fields = ("long_name", "transform", "offset", "first", "last")
-    axes = tuple(
-        schema.Axis(*(name, *map(described[name].__getitem__, fields), values[name].size))
-        for name in names
-    )
-    # one variable a function, of its coefficients and of their error
-    main = set(names)
-    stacked = []
-    kinds = schema.COEFFICIENTS[kind], "error"
-    for what, over in zip(kinds, schema.dimensions(kind), strict=True):
-        of_functions = [f"{what}_{function}" for function in schema.FUNCTIONS]
-        if any(dataset[name].dimensions != over for name in of_functions):
-            raise ValueError(f"has {what} over other dimensions than {', '.join(over)}")
-        main.update(of_functions)
-        stacked.append(of_functions)
-    coefficients, local_error = (
-        np.stack([values[name] for name in of_functions], axis=-1)
-        for of_functions in stacked
-    )
-    point = "conformance_"
-    beside = [name for name in values if name not in main and not name.startswith(point)]
-    auxiliary = {
-        name: (dataset[name].dimensions, values[name], described[name]) for name in beside
-    }
-    conformance = {
-        name.removeprefix(point): values[name]
-        for name in values
-        if name.startswith(point)
-    }
-    return schema.TableContent(
-        kind, axes, coefficients, local_error, auxiliary, conformance, attributes_of_file
-    )
-
-
-def read_table(
-    path: os.PathLike[str] | str, kind: str | None = None
-) -> schema.TableContent:
-    """Open and check a table file, which must be of a `kind` where one is given."""
-    with opened(path, REMEDY.format(kind or "all")) as dataset:
-        table_kind, version = (
-            getattr(dataset, name, None) for name in ("mbma_kind", "format_version")
-        )
-        if table_kind not in schema.KINDS or (kind is not None and table_kind != kind):
-            raise ValueError(
-                f"holds a table of kind {table_kind!r}, not {kind or ' or '.join(schema.KINDS)}"
-            )
-        if version != schema.FORMAT_VERSIONS[table_kind]:
-            raise ValueError(
-                f"has format {version}, this library reads {schema.FORMAT_VERSIONS[table_kind]}"
-            )
-        content = _content(dataset, table_kind)
-        schema.check_content(content)
-    return content
 
 
 def is_own(path: os.PathLike[str] | str) -> bool:

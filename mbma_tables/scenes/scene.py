@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from mbma_tables.common.arguments import needed
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.toml_files import check, read_toml
 from mbma_tables.scenes.plan import Plan, make_plan
 from mbma_tables.scenes.problem import Problem
-from mbma_tables.scenes.specimen import check, from_tables, read_toml, schema
+from mbma_tables.scenes.specimen import from_tables, schema
 
 if TYPE_CHECKING:
     import xarray

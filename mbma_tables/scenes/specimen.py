@@ -7,15 +7,14 @@ import functools
 import json
 import os
 import pathlib
-import tomllib
 from collections.abc import Mapping
 from typing import Any
 
-from mbma_tables.common.arguments import nearest, one_number, require
+from mbma_tables.common.arguments import one_number, require
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.files import read_file
 from mbma_tables.common.netcdf import is_own
 from mbma_tables.common.plain_text import visible
+from mbma_tables.common.toml_files import check, read_toml
 from mbma_tables.common.units import Units, factor, in_unit, known, resolve
 from mbma_tables.materials import effective_modulus
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -34,7 +33,6 @@ MAP_OPTIONS = (
     "extrapolate_to",
     "extrapolate_hurst",
 )  # for a measured map; its unit is separate
-MAX_TOML_BYTES = 2**20
 
 
 @dataclasses.dataclass(frozen=True)
@@ -240,62 +238,9 @@ def _from_table(surface: Mapping[str, Any], folder: pathlib.Path, title: str) ->
     return _from_map(path, treatment, unit)
 
 
-def read_toml(path: pathlib.Path, what: str) -> dict[str, Any]:
-    """The entries of a TOML file; `what` is its kind, for messages."""
-    try:
-        content = read_file(path, MAX_TOML_BYTES)
-    except InputError as fault:
-        raise InputError(f"{fault}; give the path of a {what} file") from None
-    try:
-        entries = tomllib.loads(content.decode("utf-8"))
-        # rejects integers and nesting too large for a message
-        repr(entries)
-    except (ValueError, RecursionError) as fault:
-        raise InputError(f"{path} is not a TOML file: {fault}") from None
-    return entries
-
-
 @functools.cache
 def schema() -> dict[str, Any]:
     """The JSON schema of scene files, as published in the package."""
     path = pathlib.Path(__file__).with_name("scene.schema.json")
     content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return content
-
-
-def check(entries: Mapping[str, Any], rules: Mapping[str, Any]) -> None:
-    """Raise an error for entries that a JSON schema does not allow, with their place and the correction."""
-    import jsonschema
-
-    faults = list(jsonschema.Draft202012Validator(rules).iter_errors(entries))
-    # a misspelt name is the cause of a missing one
-    fault = jsonschema.exceptions.best_match(
-        [f for f in faults if f.validator == "additionalProperties"] or faults
-    )
-    if fault is None:
-        return
-    place = "".join(
-        f"[{part}]" if isinstance(part, int) else f".{part}"
-        for part in fault.absolute_path
-    )[1:]
-    table = f"[{place}]" if place else "top level"
-    if fault.validator == "additionalProperties":
-        known = fault.schema["properties"]
-        unknown = next(name for name in fault.instance if name not in known)
-        tables = [
-            name
-            for name, entry in schema()["properties"].items()
-            if unknown in entry.get("properties", ())
-        ]
-        hint = (
-            f"it belongs to [{' or ['.join(f'{name}]' for name in tables)}"
-            if tables
-            else nearest(unknown, known)
-        )
-        raise InputError(f"{table}: unknown key {unknown!r}; {hint}")
-    hint = (
-        f"; write [{place}]"
-        if fault.validator == "type" and fault.schema["type"] == "object"
-        else ""
-    )
-    raise InputError(f"{place or table}: {fault.message}{hint}")

@@ -130,7 +130,7 @@ def test_a_route_that_answers_otherwise_is_counted(monkeypatch):
 def test_workers_end_with_a_killed_parent():
     code = (
         "import time\n"
-        "from generate.workers import results\n"
+        "from mbma_tables.common.workers import results\n"
         "if __name__ == '__main__':\n"
         "    for found in results('', eval, 2 * [(\"__import__('os').getpid()\",)], 2):\n"
         "        print(found, flush=True)\n"

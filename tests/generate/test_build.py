@@ -19,9 +19,9 @@ from generate.tables.certificate import Kind, UncertifiedError, phi
 from generate.tables.commands import KINDS, TABLES
 from generate.tables.configuration import MIN_SHIPPED_POINTS, load
 from generate.tables.writing import write_table
-from mbma_tables.common.netcdf import read_table
-from mbma_tables.common.table_schema import UNIVERSAL
 from mbma_tables.islands import greenwood_tripp
+from mbma_tables.tables.reader import read_table
+from mbma_tables.tables.schema import UNIVERSAL
 from mbma_tables.theories.mbma.tables import shipped
 from mbma_tables.theories.mbma.universal import UniversalModel
 

@@ -18,10 +18,10 @@ from mbma_tables.common.arguments import (
 )
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.shared import shared_property
-from mbma_tables.common.table_schema import Axis, TableContent
 from mbma_tables.core import core
 from mbma_tables.islands.island_models import SOLVER, IslandAnswer, check_outside
 from mbma_tables.islands.variants import Variant, get_variant
+from mbma_tables.tables.schema import Axis, TableContent
 
 # zeta_d at the end of the axis `sphere`, below the paper's floor of 1.5; as in mbma.h
 SPHERE_FLOOR = 1.25

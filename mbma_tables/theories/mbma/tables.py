@@ -10,19 +10,20 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray, number_in
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.common.netcdf import HDF5_LOCK, read_table
+from mbma_tables.common.netcdf import HDF5_LOCK
 from mbma_tables.common.shared import shared
-from mbma_tables.common.table_schema import (
+from mbma_tables.islands import greenwood_tripp
+from mbma_tables.islands import island_models as models
+from mbma_tables.islands.island_models import AnyModel
+from mbma_tables.islands.variants import Variant
+from mbma_tables.tables.reader import read_table
+from mbma_tables.tables.schema import (
     ARGUMENTS,
     FUNCTIONS,
     ISLAND4D,
     UNIVERSAL,
     TableContent,
 )
-from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands import island_models as models
-from mbma_tables.islands.island_models import AnyModel
-from mbma_tables.islands.variants import Variant
 from mbma_tables.theories.mbma.island4d import Island4dModel, to_axes
 from mbma_tables.theories.mbma.universal import UniversalModel
 

@@ -18,7 +18,6 @@ from mbma_tables.common.arguments import (
 from mbma_tables.common.errors import TableFileError
 from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.shared import shared_property
-from mbma_tables.common.table_schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
 from mbma_tables.core import core
 from mbma_tables.islands.island_models import (
     OUTSIDE,
@@ -26,6 +25,7 @@ from mbma_tables.islands.island_models import (
     IslandAnswer,
     check_outside,
 )
+from mbma_tables.tables.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
 
 BLOCK = 1 << 16  # islands between two checks for Ctrl-C
 TERMS = 8  # terms of each polynomial along each axis

@@ -8,9 +8,9 @@ import pytest
 from small_tables import small_table
 
 from mbma_tables import InputError, OutOfRangeError, greenwood_tripp
-from mbma_tables.common.table_schema import ISLAND4D
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.variants import REPORTED
+from mbma_tables.tables.schema import ISLAND4D
 from mbma_tables.theories.mbma.island import scale_area, scale_force
 from mbma_tables.theories.mbma.island4d import (
     SPHERE_FLOOR,

@@ -15,9 +15,9 @@ from mbma_tables.common.netcdf import (
     MAX_BYTES,
     SEAL_LENGTH,
     attributes_digest,
-    read_table,
 )
-from mbma_tables.common.table_schema import (
+from mbma_tables.tables.reader import read_table
+from mbma_tables.tables.schema import (
     FORMAT_VERSIONS,
     ISLAND4D,
     KINDS,

@@ -12,9 +12,9 @@ import mbma_tables
 from generate.files import MODULES, source_digest
 from generate.tables.writing import write_table
 from mbma_tables.common.errors import TableFileError
-from mbma_tables.common.netcdf import read_table
-from mbma_tables.common.table_schema import ISLAND4D, KINDS, UNIVERSAL
 from mbma_tables.islands import greenwood_tripp
+from mbma_tables.tables.reader import read_table
+from mbma_tables.tables.schema import ISLAND4D, KINDS, UNIVERSAL
 from mbma_tables.theories.mbma.tables import verify
 
 

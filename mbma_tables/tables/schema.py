@@ -4,8 +4,6 @@ The core relies on these checks, and the text of attributes is written to export
 """
 
 import dataclasses
-import re
-from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
@@ -189,45 +187,6 @@ def dimensions(kind: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return tuple(f"{name}_knot" for name in names), tuple(
         f"{name}_cell" for name in names
     )
-
-
-# the first pattern that matches a name determines the type of the attribute
-ATTRIBUTES: tuple[tuple[str, type, Callable[[Any], Any], str], ...] = (
-    (
-        "certificate_points|spline_degree",
-        int,
-        lambda value: value > 0,
-        "a whole number above 0",
-    ),
-    (
-        "target|.*_error_[FA]",
-        float,
-        lambda value: 0 <= value < np.inf,
-        "a finite number, at least 0",
-    ),
-    ("offset|first|last", float, np.isfinite, "a finite number"),
-    (".*_sha256", str, re.compile("[0-9a-f]{64}").fullmatch, "64 hexadecimal digits"),
-    ("data_version", str, re.compile("[0-9a-f]{12}").fullmatch, "12 hexadecimal digits"),
-    (
-        "variant|mbma_kind|transform",
-        str,
-        re.compile("[A-Za-z][A-Za-z0-9_]{0,39}").fullmatch,
-        "a name",
-    ),
-    (".*", str, str.isprintable, "printable text"),
-)
-
-
-def check_attribute(owner: str, name: str, value: Any) -> None:
-    """Raise ValueError if an attribute does not have its type; `owner` is empty for a file."""
-    expected, good, text = next(
-        row[1:] for row in ATTRIBUTES if re.fullmatch(row[0], name)
-    )
-    if type(value) is not expected or not good(value):
-        shown = repr(value)[:60]
-        raise ValueError(
-            f"has attribute {owner + ':' if owner else ''}{name} = {shown}, which must be {text}"
-        )
 
 
 def _check_axis(axis: Axis) -> None:

@@ -1,0 +1,1 @@
+"""Surrogate tables of contact islands: made, certified, written, read and looked up."""
