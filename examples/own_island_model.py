@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, island, open_table
 from mbma_tables.islands.island_models import IslandAnswer
+from mbma_tables.tables.open import shipped
 from mbma_tables.theories import Mbma
-from mbma_tables.theories.mbma.tables import shipped
 
 
 class FirstOrder:

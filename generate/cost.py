@@ -37,7 +37,7 @@ from mbma_tables.islands.variants import get_variant
 from mbma_tables.scenes.plan import UNIT, Row
 from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma.closed_forms import FormulaModel
-from mbma_tables.theories.mbma.tables import get_model
+from mbma_tables.theories.mbma.models import get_model
 
 # random islands: lowest and highest H, log10 zeta_1, log10 delta/h_rms
 ISLANDS = 1000

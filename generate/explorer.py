@@ -27,7 +27,7 @@ from mbma_tables.export.explorer import MODULE, explorer_page
 from mbma_tables.export.languages.javascript import LAW_MODULE
 from mbma_tables.export.text import core_file
 from mbma_tables.islands.variants import REPORTED
-from mbma_tables.theories.mbma.tables import universal_model
+from mbma_tables.tables.open import universal_model
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page

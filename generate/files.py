@@ -34,7 +34,7 @@ SOLVER = (
 GEOMETRY = (
     "mbma_tables.surfaces.spectrum",
     "mbma_tables.islands.geometry",
-    "mbma_tables.theories.mbma.island4d",
+    "mbma_tables.tables.island4d",
 )
 MODULES = {
     UNIVERSAL: SOLVER_SOURCES + SOLVER,

@@ -1,4 +1,4 @@
-"""Node values of uniform tensor splines to B-spline coefficients; `theories.mbma.island4d` evaluates them.
+"""Node values of uniform tensor splines to B-spline coefficients; `tables.island4d` evaluates them.
 
 On an axis of n equally spaced nodes a spline of odd degree k has n + k - 1 coefficients of cardinal
 B-splines, centred at the nodes and at (k - 1)/2 places beyond either end. Interpolation and

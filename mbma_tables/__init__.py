@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from mbma_tables.rough_body.rough_contact import rough_contact as rough_contact
     from mbma_tables.scenes.scene import Scene as Scene
     from mbma_tables.surfaces.surface import Surface as Surface
+    from mbma_tables.tables.open import open_table as open_table
     from mbma_tables.theories.mbma.island import Island as Island
     from mbma_tables.theories.mbma.island import island as island
-    from mbma_tables.theories.mbma.tables import open_table as open_table
 
 __version__ = "0.2.0"
 
@@ -52,7 +52,7 @@ _HOMES = {
     "contact_law": "mbma_tables.law.make",
     "flow_factors": "mbma_tables.contacts.film",
     "island": "mbma_tables.theories.mbma.island",
-    "open_table": "mbma_tables.theories.mbma.tables",
+    "open_table": "mbma_tables.tables.open",
     "rough_contact": "mbma_tables.rough_body.rough_contact",
     "sensitivity": "mbma_tables.contacts.sensitivity",
     # modules

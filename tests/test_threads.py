@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from mbma_tables import Surface, contact, contact_law
+from mbma_tables.tables.open import universal_model
 from mbma_tables.theories import Mbma
-from mbma_tables.theories.mbma.tables import universal_model
 
 THREADS = 16
 ENTRIES = 2000

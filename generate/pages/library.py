@@ -26,6 +26,7 @@ from generate.page import Cell, Measured, duration, panels, table
 from mbma_tables import Surface, contact
 from mbma_tables.common.plots import draw_compression, theory_label
 from mbma_tables.scenes.plan import shipped_costs, shipped_distances
+from mbma_tables.tables.open import shipped
 from mbma_tables.tables.reader import read_table
 from mbma_tables.tables.schema import (
     CELL_EDGES,
@@ -37,7 +38,6 @@ from mbma_tables.tables.schema import (
 from mbma_tables.theories import THEORIES
 from mbma_tables.theories.mbma.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.theories.mbma.closed_forms import FUNCTIONS, Function
-from mbma_tables.theories.mbma.tables import shipped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

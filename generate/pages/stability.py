@@ -27,7 +27,7 @@ from mbma_tables.islands.geometry import geometry, kinks
 from mbma_tables.islands.island_models import answer_islands
 from mbma_tables.islands.variants import get_variant
 from mbma_tables.theories import Mbma
-from mbma_tables.theories.mbma.tables import get_model
+from mbma_tables.theories.mbma.models import get_model
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -33,18 +33,18 @@ from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.surfaces.spectrum import BROADENING
+from mbma_tables.tables.island4d import (
+    SPHERE_FLOOR,
+    band_fields,
+    core_table,
+    to_axes,
+)
 from mbma_tables.tables.schema import (
     DEGREE,
     FUNCTIONS,
     ISLAND4D,
     Axis,
     TableContent,
-)
-from mbma_tables.theories.mbma.island4d import (
-    SPHERE_FLOOR,
-    band_fields,
-    core_table,
-    to_axes,
 )
 
 VISITED = {

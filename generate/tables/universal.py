@@ -28,7 +28,7 @@ from mbma_tables.tables.schema import (
     X_STEPS,
     TableContent,
 )
-from mbma_tables.theories.mbma.universal import TERMS, UniversalModel, fractions_of_mu
+from mbma_tables.tables.universal import TERMS, UniversalModel, fractions_of_mu
 
 VISITED = {
     "hurst": (0.05, 1.0),

@@ -20,7 +20,7 @@ FAITHFUL = 1e-6  # relative, of an own table's curves at the loads they go throu
 
 def _place(name: str) -> tuple[Path, str | None]:
     """Path and kind of a table; for a file, whose kind is unknown, None."""
-    from mbma_tables.theories.mbma.tables import shipped
+    from mbma_tables.tables.open import shipped
 
     if name not in KINDS and not Path(name).exists():
         raise InputError(
@@ -40,7 +40,7 @@ def tables_group() -> None:
 
 def _verified(table: str) -> tuple[dict[str, Any], str]:
     """What a check of a table found, and a line of it."""
-    from mbma_tables.theories.mbma.tables import verify
+    from mbma_tables.tables.open import verify
 
     if holds_own(table):
         import numpy as np

@@ -36,14 +36,14 @@ from mbma_tables.export.text import (
 )
 from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1
+from mbma_tables.tables.open import universal_model
+from mbma_tables.tables.universal import RECORD, UniversalModel
 from mbma_tables.theories import persson
 from mbma_tables.theories.calibrated import table as calibrated_table
 from mbma_tables.theories.calibrated.formulas import LAW_ERROR, YANG_PERSSON
 from mbma_tables.theories.mbma.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.theories.mbma.closed_forms import FUNCTIONS
 from mbma_tables.theories.mbma.sums import QUADRATURE_SHARE
-from mbma_tables.theories.mbma.tables import universal_model
-from mbma_tables.theories.mbma.universal import RECORD, UniversalModel
 
 CORE = (
     "totals.c",

@@ -16,10 +16,10 @@ from mbma_tables.export.text import comment, number
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.islands.variants import Variant
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.tables.open import universal_model
+from mbma_tables.tables.universal import UniversalModel
 from mbma_tables.theories.mbma.closed_forms import FormulaModel
 from mbma_tables.theories.mbma.sums import Sums, by_table
-from mbma_tables.theories.mbma.tables import universal_model
-from mbma_tables.theories.mbma.universal import UniversalModel
 
 Rows = Iterator[str]
 FORM = "standard"  # the form of island model "formula"

@@ -281,7 +281,7 @@ def make_plan(problem: Problem) -> Plan:
 def certified_error(island_model: str | AnyModel, rtol: float) -> float:
     """Bound on the relative error of islands at `rtol`; NaN if only results have it."""
     if island_model == "universal":
-        from mbma_tables.theories.mbma.tables import open_table
+        from mbma_tables.tables.open import open_table
 
         certificate = open_table(island_model).content.attributes
         return max(

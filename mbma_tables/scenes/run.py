@@ -29,7 +29,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories import resolve
-from mbma_tables.theories.mbma.tables import get_model
+from mbma_tables.theories.mbma.models import get_model
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -497,7 +497,7 @@ def _hashes(steps: list[Step]) -> dict[str, str]:
     used = {step.island_model_name: step.island_model for step in steps}
     if not used.keys() & set(TABLES):
         return {}
-    from mbma_tables.theories.mbma.tables import open_table
+    from mbma_tables.tables.open import open_table
 
     hashes = {}
     for name in TABLES:

@@ -8,9 +8,9 @@ from helpers import refused, run
 from small_tables import small_table
 
 from generate.tables.writing import write_table
+from mbma_tables.tables import open as tabulated
 from mbma_tables.tables.reader import read_table
 from mbma_tables.tables.schema import FORMAT_VERSIONS, KINDS, UNIVERSAL
-from mbma_tables.theories.mbma import tables as tabulated
 
 
 @pytest.fixture

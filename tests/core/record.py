@@ -12,8 +12,8 @@ import numpy as np
 from mbma_tables import Bodies
 from mbma_tables import core as package
 from mbma_tables.islands.variants import REPORTED
+from mbma_tables.tables.island4d import band_fields
 from mbma_tables.theories import Mbma
-from mbma_tables.theories.mbma.island4d import band_fields
 
 MOST_CALLS = 12  # of each function
 MOST_BYTES = 5_000_000  # of an array

@@ -22,9 +22,9 @@ from mbma_tables.export.c_code import SELFTEST, SOURCES, check, read_report, wri
 from mbma_tables.export.law_rows import describe_law
 from mbma_tables.export.text import checked_name
 from mbma_tables.islands.variants import Variant, get_variant
+from mbma_tables.tables.open import universal_model
+from mbma_tables.tables.universal import UniversalModel
 from mbma_tables.theories.mbma.closed_form_certificates import RANGES
-from mbma_tables.theories.mbma.tables import universal_model
-from mbma_tables.theories.mbma.universal import UniversalModel
 
 POINTS = 10_000
 SURFACES = 60

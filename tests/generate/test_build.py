@@ -20,10 +20,10 @@ from generate.tables.commands import KINDS, TABLES
 from generate.tables.configuration import MIN_SHIPPED_POINTS, load
 from generate.tables.writing import write_table
 from mbma_tables.islands import greenwood_tripp
+from mbma_tables.tables.open import shipped
 from mbma_tables.tables.reader import read_table
 from mbma_tables.tables.schema import UNIVERSAL
-from mbma_tables.theories.mbma.tables import shipped
-from mbma_tables.theories.mbma.universal import UniversalModel
+from mbma_tables.tables.universal import UniversalModel
 
 # fresh points find other worst places than the few hundred of a small certificate
 STATED_FACTOR = 1.5

@@ -14,7 +14,7 @@ from mbma_tables import OutOfRangeError, Surface, greenwood_tripp, island
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.islands.variants import PRINTED, REPORTED, VARIANTS
 from mbma_tables.surfaces.spectrum import BROADENING
-from mbma_tables.theories.mbma.island4d import band_fields
+from mbma_tables.tables.island4d import band_fields
 
 
 def one_geometry(approach, hurst, zeta_1, variant):

@@ -27,9 +27,9 @@ from mbma_tables.core import core
 from mbma_tables.islands.variants import NAMED
 from mbma_tables.law import block as at
 from mbma_tables.theories import Mbma
+from mbma_tables.theories.mbma.models import get_model
 from mbma_tables.theories.mbma.profile import profile
 from mbma_tables.theories.mbma.sums import Sums, by_table
-from mbma_tables.theories.mbma.tables import get_model
 
 # hurst, zeta_1, h_max/h_rms, variant
 CASES = [

@@ -296,7 +296,7 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
 
 @pytest.mark.parametrize("name", ["comparison", "pressure_profile"])
 def test_tables_are_not_read_where_nothing_looks_up(name, monkeypatch):
-    from mbma_tables.theories.mbma import tables as tabulated
+    from mbma_tables.tables import open as tabulated
 
     def refuse(*_):
         raise AssertionError("a table was read")

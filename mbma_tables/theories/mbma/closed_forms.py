@@ -22,8 +22,8 @@ from mbma_tables.common.arguments import (
 )
 from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.tables.universal import Ranged
 from mbma_tables.theories.mbma.closed_form_certificates import CERTIFICATES, RANGES
-from mbma_tables.theories.mbma.universal import Ranged
 
 ISLAND_FORMS = ("pocket", "standard", "long")
 TOTALS = "totals"

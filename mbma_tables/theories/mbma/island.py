@@ -29,7 +29,7 @@ from mbma_tables.islands.island_models import (
 from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
-from mbma_tables.theories.mbma.tables import get_model
+from mbma_tables.theories.mbma.models import get_model
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

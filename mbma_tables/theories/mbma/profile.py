@@ -34,8 +34,8 @@ from mbma_tables.islands.island_models import AnyModel, answer_islands
 from mbma_tables.islands.variants import Variant
 from mbma_tables.surfaces.spectrum import Place
 from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.tables.universal import UniversalModel
 from mbma_tables.theories.mbma.island import refuse_bands, scale_area, scale_force
-from mbma_tables.theories.mbma.universal import UniversalModel
 
 NODES = 16  # nodes of a panel, MBMA_PANEL_NODES of mbma.h
 GAPS = 10  # largest number of gaps of a panel: a series has 2 GAPS terms

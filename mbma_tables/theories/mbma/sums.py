@@ -22,8 +22,8 @@ from mbma_tables.islands.island_models import AnyModel, exact_model
 from mbma_tables.islands.variants import Variant
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
+from mbma_tables.tables.universal import UniversalModel
 from mbma_tables.theories.mbma.profile import Shape, profile
-from mbma_tables.theories.mbma.universal import UniversalModel
 
 QUADRATURE_SHARE = 0.9  # of the requested tolerance; a table's own error comes on top
 BLOCK = 256  # pairs between two checks for interrupts

@@ -32,9 +32,9 @@ from mbma_tables.theories.base import (
 )
 from mbma_tables.theories.inversion import Curve
 from mbma_tables.theories.mbma.island import check_band
+from mbma_tables.theories.mbma.models import get_model
 from mbma_tables.theories.mbma.profile import profile
 from mbma_tables.theories.mbma.sums import QUADRATURE_SHARE, Sums, Totals, totals_at
-from mbma_tables.theories.mbma.tables import get_model
 
 SCAN = 49  # compressions at which force, area and stiffness are searched for a maximum
 # leading powers of h_max - d of force and area

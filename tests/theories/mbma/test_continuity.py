@@ -18,8 +18,8 @@ from mbma_tables.islands.geometry import kinks
 from mbma_tables.islands.greenwood_tripp import height_integral
 from mbma_tables.islands.variants import VARIANTS, get_variant
 from mbma_tables.law.block import CENTRE, RATE
+from mbma_tables.tables.open import universal_model
 from mbma_tables.theories import Mbma
-from mbma_tables.theories.mbma.tables import universal_model
 
 STEP = 1e-9
 FAR = 1e-5

@@ -10,9 +10,9 @@ from mbma_tables import ConvergenceError, Surface, contact
 from mbma_tables.core import INVALID, OK, UNRESOLVED, core
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.islands.variants import PRINTED, REPORTED
+from mbma_tables.tables.open import universal_model
 from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma import sums as sums
-from mbma_tables.theories.mbma.tables import universal_model
 
 
 @pytest.mark.parametrize(

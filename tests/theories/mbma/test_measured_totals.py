@@ -12,8 +12,8 @@ from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_l
 from mbma_tables.islands.island_models import answer_islands
 from mbma_tables.islands.variants import FITTED, PRINTED, REPORTED
 from mbma_tables.theories import Mbma
+from mbma_tables.theories.mbma.models import get_model
 from mbma_tables.theories.mbma.profile import profile, source_of
-from mbma_tables.theories.mbma.tables import get_model
 
 DATA = pathlib.Path(__file__).parents[2] / "data"
 DEPTHS = np.array([1e-9, 1e-4, 0.02, 0.3, 1.0, 1.5, 2.0])  # (h_max - d)/h_max

@@ -10,15 +10,15 @@ from small_tables import small_table
 from mbma_tables import InputError, OutOfRangeError, greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.variants import REPORTED
-from mbma_tables.tables.schema import ISLAND4D
-from mbma_tables.theories.mbma.island import scale_area, scale_force
-from mbma_tables.theories.mbma.island4d import (
+from mbma_tables.tables.island4d import (
     SPHERE_FLOOR,
     Island4dModel,
     band_fields,
     to_axes,
 )
-from mbma_tables.theories.mbma.tables import open_table
+from mbma_tables.tables.open import open_table
+from mbma_tables.tables.schema import ISLAND4D
+from mbma_tables.theories.mbma.island import scale_area, scale_force
 
 
 @pytest.fixture(scope="module")

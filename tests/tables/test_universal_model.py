@@ -14,10 +14,10 @@ from mbma_tables import InputError, OutOfRangeError, greenwood_tripp
 from mbma_tables.common.netcdf import digest_json
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.variants import REPORTED, get_variant
+from mbma_tables.tables.open import open_table, shipped, universal_model, verify
 from mbma_tables.tables.reader import read_table
 from mbma_tables.tables.schema import CELL_EDGES, ISLAND4D, KINDS, UNIVERSAL
-from mbma_tables.theories.mbma.tables import open_table, shipped, universal_model, verify
-from mbma_tables.theories.mbma.universal import UniversalModel
+from mbma_tables.tables.universal import UniversalModel
 
 
 @pytest.fixture(scope="module")

@@ -13,9 +13,9 @@ from generate.files import MODULES, source_digest
 from generate.tables.writing import write_table
 from mbma_tables.common.errors import TableFileError
 from mbma_tables.islands import greenwood_tripp
+from mbma_tables.tables.open import verify
 from mbma_tables.tables.reader import read_table
 from mbma_tables.tables.schema import ISLAND4D, KINDS, UNIVERSAL
-from mbma_tables.theories.mbma.tables import verify
 
 
 @pytest.fixture(params=KINDS)
