@@ -29,7 +29,7 @@ COMMANDS = {
     "quantities": "generate.quantities",
     "rough_spheres": "generate.rough_spheres",
     "score": "generate.distances",
-    "tables": "generate.tables.commands",
+    "tables": "generate.tables",
 }
 
 

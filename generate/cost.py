@@ -23,7 +23,6 @@ from scipy.stats import qmc
 
 from generate import cost_distances
 from generate.files import ROOT, to_csv
-from generate.tables.certificate import phi
 from generate.timing import measure
 from mbma_tables import Scene, Surface, contact, contact_law, theories
 from mbma_tables.common.arguments import FloatArray
@@ -35,6 +34,7 @@ from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.island_models import ISLAND_MODELS, answer_islands
 from mbma_tables.islands.variants import get_variant
 from mbma_tables.scenes.plan import UNIT, Row
+from mbma_tables.tables.certificate import phi
 from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma.closed_forms import FormulaModel
 from mbma_tables.theories.mbma.models import get_model

@@ -31,13 +31,13 @@ from generate.calibrated_file import (
     within,
     write_part,
 )
-from generate.splines import coefficients
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.workers import results
 from mbma_tables.data import FILE
 from mbma_tables.quantities import effective_medium as leakage
 from mbma_tables.quantities.effective_medium import FlowConstants
 from mbma_tables.quantities.leakage import GROUP
+from mbma_tables.tables.splines import coefficients
 from mbma_tables.theories import resolve
 from mbma_tables.theories.calibrated.formulas import (
     Constants,

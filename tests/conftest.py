@@ -55,7 +55,7 @@ def generations():
 def table_files(tmp_path_factory):
     from small_tables import KINDS, small_table
 
-    from generate.tables.writing import write_table
+    from mbma_tables.tables.writer import write_table
 
     folder = tmp_path_factory.mktemp("tables")
     return {kind: write_table(folder / f"{kind}.nc", small_table(kind)) for kind in KINDS}

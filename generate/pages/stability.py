@@ -18,9 +18,9 @@ import mpmath as mp
 import numpy as np
 from matplotlib.colors import LogNorm
 
+from generate.exact_geometry import DOUBLES, divisor, exact_island
+from generate.height_coefficients import height_integral
 from generate.page import Cell, Measured, panels, table
-from generate.tables.exact_geometry import DOUBLES, divisor, exact_island
-from generate.tables.height_coefficients import height_integral
 from mbma_tables import Surface, contact, greenwood_tripp
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.islands.geometry import geometry, kinks

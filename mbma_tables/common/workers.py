@@ -9,8 +9,6 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from tqdm import tqdm
-
 
 def end_with(parent: int) -> None:
     """End this process when its parent is gone, even if that was killed."""
@@ -30,6 +28,8 @@ def results(
     workers: int = 1,
 ) -> Iterator[Any]:
     """``work(*job)`` of each job, in order, with a progress bar of that name where stderr is a terminal."""
+    from tqdm import tqdm
+
     # started afresh: threads and forks do not mix
     start = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(

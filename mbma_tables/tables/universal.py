@@ -117,6 +117,7 @@ class UniversalModel(Ranged):
     def answer(
         self, X: ArrayLike, mu: ArrayLike, *, outside: str = "raise"
     ) -> IslandAnswer:
+        """Phi_F, Phi_A and the bound on their relative error, see `Ranged.answer`."""
         one = self._one(X, mu)
         if one is None or outside not in OUTSIDE:
             return super().answer(X, mu, outside=outside)

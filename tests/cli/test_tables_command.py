@@ -7,10 +7,10 @@ import pytest
 from helpers import refused, run
 from small_tables import small_table
 
-from generate.tables.writing import write_table
 from mbma_tables.tables import open as tabulated
 from mbma_tables.tables.reader import read_table
 from mbma_tables.tables.schema import FORMAT_VERSIONS, KINDS, UNIVERSAL
+from mbma_tables.tables.writer import write_table
 
 
 @pytest.fixture

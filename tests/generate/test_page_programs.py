@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from generate import height_coefficients
 from generate.__main__ import COMMANDS, main
 from generate.files import ROOT
 from generate.page import MARKED, fill, svg
 from generate.pages import library, maps, stability
-from generate.tables import height_coefficients
 from mbma_tables import InputError, Surface, contact, theories
 
 SVG = b"<?xml"

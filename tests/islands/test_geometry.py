@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from catalogue import random_surfaces
 
-from generate.tables.exact_geometry import DIGITS, divisor, exact_island
+from generate.exact_geometry import DIGITS, divisor, exact_island
 from mbma_tables import OutOfRangeError, Surface, greenwood_tripp, island
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.islands.variants import PRINTED, REPORTED, VARIANTS

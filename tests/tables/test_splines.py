@@ -8,13 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
 
-from generate.splines import coefficients, padding
 from mbma_tables.common.arguments import filled
 from mbma_tables.core import core
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.variants import REPORTED
 from mbma_tables.tables.island4d import core_table
 from mbma_tables.tables.schema import Axis
+from mbma_tables.tables.splines import coefficients, padding
 
 SHAPE = (9, 8, 7, 6)
 

@@ -9,7 +9,6 @@ import pytest
 from numpy.polynomial.chebyshev import chebval2d
 from small_tables import small_table
 
-from generate.tables.writing import write_table
 from mbma_tables import InputError, OutOfRangeError, greenwood_tripp
 from mbma_tables.common.netcdf import digest_json
 from mbma_tables.islands.geometry import geometry
@@ -18,6 +17,7 @@ from mbma_tables.tables.open import open_table, shipped, universal_model, verify
 from mbma_tables.tables.reader import read_table
 from mbma_tables.tables.schema import CELL_EDGES, ISLAND4D, KINDS, UNIVERSAL
 from mbma_tables.tables.universal import UniversalModel
+from mbma_tables.tables.writer import write_table
 
 
 @pytest.fixture(scope="module")

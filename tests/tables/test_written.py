@@ -9,13 +9,13 @@ import pytest
 from small_tables import small_table
 
 import mbma_tables
-from generate.files import MODULES, source_digest
-from generate.tables.writing import write_table
 from mbma_tables.common.errors import TableFileError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.tables.open import verify
 from mbma_tables.tables.reader import read_table
 from mbma_tables.tables.schema import ISLAND4D, KINDS, UNIVERSAL
+from mbma_tables.tables.sources import MODULES, source_digest
+from mbma_tables.tables.writer import write_table
 
 
 @pytest.fixture(params=KINDS)

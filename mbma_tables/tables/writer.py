@@ -10,12 +10,12 @@ from typing import Any
 import netCDF4
 import numpy as np
 
-from generate.files import MODULES, source_digest, versions
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import write_file, written_bytes
 from mbma_tables.common.netcdf import HDF5_LOCK, SEAL, attributes_digest, digest_arrays
 from mbma_tables.tables import schema as schema
 from mbma_tables.tables.schema import check_content
+from mbma_tables.tables.sources import MODULES, source_digest, versions
 
 CONVENTIONS = "CF-1.11"
 ANSWERS = {schema.UNIVERSAL: "Phi_{f}", schema.ISLAND4D: "{f}_hat"}
@@ -46,6 +46,7 @@ def about(kind: str, **numbers: Any) -> dict[str, str]:
 
 
 def label(text: str) -> dict[str, Any]:
+    """Attributes of a variable without a unit."""
     return {"long_name": text, "units": "1"}
 
 
@@ -105,6 +106,7 @@ def _fill(dataset: netCDF4.Dataset, content: schema.TableContent) -> None:
 def write_table(
     path: os.PathLike[str] | str, content: schema.TableContent
 ) -> pathlib.Path:
+    """Write a table's file whole, or raise TableFileError and write nothing."""
     target = pathlib.Path(path)
     check_content(content)
     digest = digest_arrays(content.arrays())

@@ -8,19 +8,18 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.stats import qmc
 
-from generate.tables.certificate import (
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.workers import results
+from mbma_tables.islands import greenwood_tripp
+from mbma_tables.islands.geometry import geometry
+from mbma_tables.islands.variants import VARIANTS
+from mbma_tables.tables.certificate import (
     CONFORMANCE_POINTS,
     Kind,
     UncertifiedError,
     conformance,
     phi,
 )
-from generate.tables.writing import about, label
-from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.workers import results
-from mbma_tables.islands import greenwood_tripp
-from mbma_tables.islands.geometry import geometry
-from mbma_tables.islands.variants import VARIANTS
 from mbma_tables.tables.schema import (
     BUCKET_BITS,
     CELL_EDGES,
@@ -29,6 +28,7 @@ from mbma_tables.tables.schema import (
     TableContent,
 )
 from mbma_tables.tables.universal import TERMS, UniversalModel, fractions_of_mu
+from mbma_tables.tables.writer import about, label
 
 VISITED = {
     "hurst": (0.05, 1.0),
@@ -76,6 +76,8 @@ def values(X: FloatArray, mu: FloatArray, rtol: float) -> FloatArray:
 
 @dataclasses.dataclass(frozen=True)
 class Strip:
+    """A range of X, with the cells of mu that it is divided into."""
+
     low: float
     high: float
     mu_high: float
@@ -83,6 +85,7 @@ class Strip:
     rtol: float
 
     def is_narrow(self) -> bool:
+        """Whether polynomials of X are accurate over its range."""
         mu = np.minimum(LINES, self.mu_high)
         series = FIT @ values(X_at(NODES, self.low, self.high), mu, self.rtol)
         exact = values(X_at(TESTS, self.low, self.high), mu, self.rtol)
@@ -166,6 +169,8 @@ def cells_of(
 
 
 class Universal(Kind):
+    """The two-parameter table of a configuration."""
+
     def strips(self) -> list[Strip]:
         """Ranges of X, each as wide as polynomials allow."""
         X, mu = (self.configuration.axes[name] for name in ("X", "mu"))
@@ -192,6 +197,7 @@ class Universal(Kind):
         return strips
 
     def build(self) -> TableContent:
+        """The table, certified."""
         own = self.configuration
         jobs = [dataclasses.astuple(strip) for strip in self.strips()]
         rows = np.concatenate([*results("cells", cells_of, jobs, self.workers)])
@@ -272,6 +278,7 @@ class Universal(Kind):
         return [X[chosen], mu[chosen]]
 
     def check(self, content: TableContent) -> None:
+        """Force and area are positive and monotonic, and agree where cells meet."""
         X_low, X_high, mu_low, mu_high = (
             content.auxiliary[name][1][:, None] for name in CELL_EDGES
         )

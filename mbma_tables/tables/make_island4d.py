@@ -19,20 +19,18 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
-from generate.splines import coefficients, padding
-from generate.tables.certificate import (
-    CONFORMANCE_POINTS,
-    Kind,
-    UncertifiedError,
-    conformance,
-)
-from generate.tables.writing import TEXTS, about, label
 from mbma_tables.common.arguments import FloatArray, filled
 from mbma_tables.core import core
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.surfaces.spectrum import BROADENING
+from mbma_tables.tables.certificate import (
+    CONFORMANCE_POINTS,
+    Kind,
+    UncertifiedError,
+    conformance,
+)
 from mbma_tables.tables.island4d import (
     SPHERE_FLOOR,
     band_fields,
@@ -46,6 +44,8 @@ from mbma_tables.tables.schema import (
     Axis,
     TableContent,
 )
+from mbma_tables.tables.splines import coefficients, padding
+from mbma_tables.tables.writer import TEXTS, about, label
 
 VISITED = {
     "hurst": (0.3, 1.0),
@@ -99,16 +99,20 @@ def along_edges(errors: FloatArray, axis: int) -> tuple[FloatArray, FloatArray]:
 
 
 class Island4d(Kind):
+    """The four-parameter table of a configuration."""
+
     # errors of the spline are far below the target in most cells, and their bounds with them
     solver_share = 1e-5
 
     @property
     def variant(self) -> Variant:
+        """The variant of the paper that it is made for."""
         return get_variant(self.configuration.variant)
 
     # the spline's factors are rounded differently on another number of BLAS threads
     @threadpool_limits.wrap(limits=BLAS_THREADS)
     def build(self) -> TableContent:
+        """The table, certified."""
         own = self.configuration
         axes = tuple(own.axes.values())
         grid = np.meshgrid(*(axis.values for axis in axes), indexing="ij")
@@ -276,6 +280,7 @@ class Island4d(Kind):
         return found
 
     def attributes(self) -> dict[str, Any]:
+        """Attributes of its file."""
         sigma = (
             f"sqrt((1 - {BROADENING}/alpha) m0)"
             if self.variant.summit_sigma
@@ -327,6 +332,7 @@ class Island4d(Kind):
         )
 
     def check(self, content: TableContent) -> None:
+        """Force and area increase with X and stay within the limits of a rigid sphere."""
         places = [np.arange(2 * (axis.nodes - 1) + 1) / 2 for axis in content.axes[:2]]
         places += [
             np.minimum(np.arange(axis.nodes - 0.5), axis.nodes - 1)

@@ -13,17 +13,18 @@ from click.testing import CliRunner
 from small_tables import SMALL, small, small_build
 
 from generate.__main__ import main
-from generate.files import MODULES, ROOT, source_digest, versions
-from generate.tables import certificate
-from generate.tables.certificate import Kind, UncertifiedError, phi
-from generate.tables.commands import KINDS, TABLES
-from generate.tables.configuration import MIN_SHIPPED_POINTS, load
-from generate.tables.writing import write_table
+from generate.files import ROOT
+from generate.tables import KINDS, TABLES
 from mbma_tables.islands import greenwood_tripp
+from mbma_tables.tables import certificate
+from mbma_tables.tables.certificate import Kind, UncertifiedError, phi
+from mbma_tables.tables.configuration import MIN_SHIPPED_POINTS, load
 from mbma_tables.tables.open import shipped
 from mbma_tables.tables.reader import read_table
 from mbma_tables.tables.schema import UNIVERSAL
+from mbma_tables.tables.sources import MODULES, source_digest, versions
 from mbma_tables.tables.universal import UniversalModel
+from mbma_tables.tables.writer import write_table
 
 # fresh points find other worst places than the few hundred of a small certificate
 STATED_FACTOR = 1.5

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from generate.tables.writing import TEXTS
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.netcdf import digest_json
 from mbma_tables.common.toml_files import check, read_toml
 from mbma_tables.islands.variants import get_variant
 from mbma_tables.tables.schema import AXES, DEGREE, ISLAND4D, Axis
+from mbma_tables.tables.writer import TEXTS
 
 HERE = pathlib.Path(__file__).parent
 # ranges within which the solver reaches its tightest tolerance, whatever the other axes
@@ -30,6 +30,8 @@ MIN_SHIPPED_POINTS = 5000  # of the certificate of a table in the shipped folder
 
 @dataclasses.dataclass(frozen=True)
 class Configuration:
+    """What a table is to cover, and how accurately."""
+
     kind: str  # universal or island4d
     target: float  # largest relative error allowed on held-out points
     max_nodes: int  # of the whole table

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from generate.tables.configuration import Configuration
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.common.workers import results
 from mbma_tables.islands import greenwood_tripp
+from mbma_tables.tables.configuration import Configuration
 from mbma_tables.tables.schema import FUNCTIONS, TableContent, check_content
 
 CONFORMANCE_POINTS = 64
@@ -120,6 +120,7 @@ class Kind:
         return result
 
     def require(self, rules: dict[str, Any]) -> None:
+        """Raise UncertifiedError that names the first of these rules that is not kept."""
         for rule, kept in rules.items():
             if not kept:
                 raise UncertifiedError(
@@ -127,9 +128,11 @@ class Kind:
                 )
 
     def check(self, content: TableContent) -> None:
+        """Raise UncertifiedError for a table that breaks a physical rule."""
         raise NotImplementedError
 
     def checked(self, content: TableContent) -> TableContent:
+        """The table, consistent and within the physical rules, or UncertifiedError."""
         try:
             check_content(content)
         except ValueError as fault:

@@ -18,7 +18,7 @@ from numpy.polynomial import chebyshev
 from mbma_tables.common.files import write_file
 
 TARGET = (
-    pathlib.Path(__file__).parents[2] / "mbma_tables" / "core" / "height_coefficients.h"
+    pathlib.Path(__file__).parents[1] / "mbma_tables" / "core" / "height_coefficients.h"
 )
 HEADER = """\
 /* Height integrals as polynomials. Made by python -m generate tables heights.

@@ -6,13 +6,12 @@ import pathlib
 import click
 
 from generate.files import ROOT
-from generate.tables import height_coefficients
-from generate.tables.configuration import MIN_SHIPPED_POINTS, Configuration, load
-from generate.tables.island4d import Island4d
-from generate.tables.universal import Universal
-from generate.tables.writing import write_table
 from mbma_tables.common.errors import InputError
+from mbma_tables.tables.configuration import MIN_SHIPPED_POINTS, Configuration, load
+from mbma_tables.tables.make_island4d import Island4d
+from mbma_tables.tables.make_universal import Universal
 from mbma_tables.tables.schema import ISLAND4D, UNIVERSAL
+from mbma_tables.tables.writer import write_table
 
 TABLES = ROOT / "tables"
 KINDS: dict[str, type[Universal | Island4d]] = {UNIVERSAL: Universal, ISLAND4D: Island4d}
@@ -64,6 +63,8 @@ def tables(
             raise InputError(f"--out must name a file for one table, {path} is a folder")
         chosen[path] = own
     if what in ("all", "heights"):
+        from generate import height_coefficients
+
         height_coefficients.main()
     for path, configuration in chosen.items():
         content = KINDS[configuration.kind](configuration, workers).build()

@@ -1,1 +1,0 @@
-"""Tables: built on workers, certified, written."""
