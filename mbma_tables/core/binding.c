@@ -334,8 +334,8 @@ static PyObject *ask_law(PyObject *self, PyObject *const *arguments, Py_ssize_t 
     }
     if (answer != NULL)
         return answer;
-    return PyObject_CallMethod(self, "_ask_one", "iOOOO", what, mean_separation, separation, pressure,
-                               area);
+    return PyObject_CallMethod(self, "_ask_one", "iOOOO", what, mean_separation, separation,
+                               pressure, area);
 }
 
 #define QUANTITIES(OF) \
@@ -347,7 +347,8 @@ static PyObject *ask_law(PyObject *self, PyObject *const *arguments, Py_ssize_t 
        "MBMA's jumps where zeta_d reaches its floor, and belongs to the larger gap there.") \
     OF(area_slope, MBMA_AREA_SLOPE, "-d(A/A0)/dd.") \
     OF(energy, MBMA_ENERGY, \
-       "Elastic energy per nominal area, the integral of F/A0 over u to last contact.")
+       "Elastic energy per nominal area, the integral of F/A0 over u to last contact; an error\n" \
+       "with a hardness, as of contact.")
 #define ASK(name, what, text) \
     static PyObject *law_##name(PyObject *self, PyObject *const *arguments, Py_ssize_t count, \
                                 PyObject *names) { \
@@ -371,7 +372,8 @@ static PyObject *law_addresses(PyObject *self, PyObject *nothing) {
 
 #define METHOD(name, what, text) \
     {#name, (PyCFunction)(void (*)(void))law_##name, METH_FASTCALL | METH_KEYWORDS, \
-     #name "($self, mean_separation=None, *, separation=None, pressure=None, area=None)\n--\n\n" text},
+     #name "($self, mean_separation=None, *, separation=None, pressure=None, area=None)" \
+           "\n--\n\n" text},
 static PyMethodDef LAW_METHODS[] = {
     QUANTITIES(METHOD){"_addresses", law_addresses, METH_NOARGS, NULL},
     {NULL, NULL, 0, NULL},

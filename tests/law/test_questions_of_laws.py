@@ -1,6 +1,7 @@
 """What a law is asked by: gaps, pressures and areas, in any form, as `contact` takes them and with its answers."""
 
 import itertools
+import pickle
 import warnings
 
 import numpy as np
@@ -155,7 +156,8 @@ def test_a_question_has_one_quantity():
 
 def test_the_energy_of_a_yielded_contact_is_refused_by_every_route():
     law = contact_law(FACE, Bodies("100 GPa", hardness="1 GPa"), theory="calibrated")
-    for ask in (law.energy, lambda u: law.at(u).energy):
+    again = pickle.loads(pickle.dumps(law))
+    for ask in (law.energy, lambda u: law.at(u).energy, again.energy):
         with pytest.raises(InputError, match="a yielded contact gives back is not known"):
             ask(2.0)
     with pytest.raises(InputError, match="a yielded contact gives back is not known"):
