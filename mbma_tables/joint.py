@@ -679,6 +679,8 @@ class Joint(JointQuantities, Displayed):
         if self.pair is not None:
             metal_a, metal_b = self.pair.metals
             facts["metals"] = f"{metal_a.name} on {metal_b.name}"
+            if self.bodies.conductivity == self.pair.conductivities:
+                facts["conductivities"] = self.pair.ranges_of_conductivity
             if hardness is None:
                 hardness = f"not known: name the temper of {self.pair.softer.name}"
         in_units = self._in_units

@@ -392,6 +392,18 @@ class Pair:
         first, second = self.metals
         return _mean_conductivity(first), _mean_conductivity(second)
 
+    @property
+    def ranges_of_conductivity(self) -> str:
+        """The ranges in the literature of which `conductivities` are the means, as text."""
+        ranges = [metal.conductivity for metal in self.metals]
+        texts = [
+            f"{low:g}" if low == high else f"{low:g} to {high:g}" for low, high in ranges
+        ]
+        text = f"{' and '.join(texts)} W/(m K)"
+        if all(low == high for low, high in ranges):
+            return text
+        return f"{text}; of a range the geometric mean is used"
+
 
 def _mean_conductivity(metal: Metal) -> str:
     """Thermal conductivity with its unit, the geometric mean of its range."""

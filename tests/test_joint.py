@@ -725,3 +725,15 @@ def test_falling_pressures_are_told_not_to_be_unloading(joint):
     assert elastic.at_pressure(["10 MPa", "1 MPa"]).loading == ""
     assert "loading" not in elastic.table(["10 MPa"]).attrs
     assert joint.table(["10 MPa"]).attrs["loading"] == rising
+
+
+def test_a_joint_tells_the_ranges_of_its_conductivities(joint):
+    """The middle of 154 to 180 W/(m K) was taken without a word."""
+    low, high = materials.pair("aluminium 6061 hard").softer.conductivity
+    assert low < high
+    text = joint.facts()["conductivities"]
+    assert f"and {low:g} to {high:g} W/(m K); of a range the geometric mean" in text
+    assert text in repr(joint)
+    # what a user states is no mean of a range
+    stated = Bodies(metals=METALS, conductivity="50 W/(m K)")
+    assert "conductivities" not in dataclasses.replace(joint, bodies=stated).facts()

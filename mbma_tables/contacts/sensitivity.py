@@ -48,8 +48,8 @@ class Sensitivity:
         str, float
     ]  #: the surface's parameters, the modulus if given, and the quantity held fixed
     answers: dict[str, float]  #: the results for these parameters
-    # : d ln(result)/d ln(parameter) by parameter and result, the other parameters held; NaN
-    # where the result jumps
+    #: d ln(result)/d ln(parameter) by parameter and result, the other parameters held; NaN
+    #: where the result jumps
     slopes: dict[str, dict[str, float]]
     errors: dict[str, dict[str, float]]  #: estimates of their errors
     units: Units  #: of parameters and results
@@ -258,7 +258,7 @@ def relative_derivatives(
     if yields and isinstance(unknowns, OfOneMap):
         raise InputError(
             f"theory {theory.name!r} simulates the map anew for each hardness, too coarsely for derivatives by it: "
-            "give theory='calibrated', or hardness=float('inf') for the elastic contact"
+            "give theory='calibrated', or Bodies(..., hardness=float('inf')) for the elastic contact"
         )
     given = {**unknowns.numbers, **moduli, by: value}
     if yields:

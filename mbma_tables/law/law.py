@@ -120,22 +120,22 @@ class ContactLaw(Law, LawQuantities, Displayed):
     """
 
     setup: Setup  #: the surface, the bodies and the theory of the law
-    # : highest point [length]; if contact ends there, results are zero at this gap and
-    # above
+    #: highest point [length]; if contact ends there, results are zero at this gap and
+    #: above
     h_max: float
     lowest: float  #: least gap d that the law covers
     highest: float  #: largest one; infinite where contact ends at h_max
-    # : bound on the relative error of force and area, of the polynomials and what they were
-    # made from together; with a : hardness it does not hold within 1e-6 h_max of last
-    # contact, where islands turn elastic one by one
+    #: bound on the relative error of force and area, of the polynomials and what they were
+    #: made from together; with a hardness it does not hold within 1e-6 h_max of last
+    #: contact, where islands turn elastic one by one
     error: float
     turning_point: (
         float | None
     )  #: gap below which force decreases under compression, if it does; inverses end there
     area_turning_point: float | None  #: the same of the area
     block: FloatArray  #: the polynomials, in the layout that `mbma_tables/core/mbma.h` describes
-    # : bounds on the relative error of a record's values, and of its slopes over F/x,
-    # (records, 2)
+    #: bounds on the relative error of a record's values, and of its slopes over F/x,
+    #: (records, 2)
     errors: FloatArray
     elastic: Callable[[], ContactLaw] | None = (
         None  #: with a hardness, makes the law of the elastic contact

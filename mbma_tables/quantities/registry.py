@@ -57,8 +57,8 @@ class Quantity:
     )
     #: name of the quantity that holds its model uncertainty, None where it has none of its own
     uncertainty: str | None = None
-    # : curve of a law to which it is proportional, for the bodies of that law: rows and
-    # code write it as such
+    #: curve of a law to which it is proportional, for the bodies of that law: rows and
+    #: code write it as such
     ratio_to: str | None = None
     is_column: bool = True  # whether tables in a terminal have it
     # whether datasets have it without being asked, since it takes no further simulation

@@ -101,7 +101,7 @@ def _reasons_of_bodies(
     if bodies.pair is None:
         text = (
             f"no hardness is given, and the mean contact pressure is above {HARDEST:g} GPa, that of the hardest metal "
-            "in materials.METALS: give hardness= of the softer body, or infinity where it does not yield"
+            "in materials.METALS: give Bodies(..., hardness=) of the softer body, or infinity where it does not yield"
         )
         return {text: is_elastic & (mean_pressure > HARDEST * gigapascal)}
     softer = bodies.pair.softer

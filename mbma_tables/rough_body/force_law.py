@@ -319,12 +319,12 @@ class ForceLaw:
     Approaches are numbers in the surface's unit or texts, "0.8 um"; zero force below `first`.
     """
 
-    # : the same in the layout of contact laws, against the approach that is left to the
-    # largest one: "pressure" is force : and "area" real area, `error` bounds the relative
-    # error of both
+    #: the same in the layout of contact laws, against the approach that is left to the
+    #: largest one: "pressure" is force and "area" real area, `error` bounds the relative
+    #: error of both
     law: ContactLaw
-    # : approach of first contact; of a layer without one, at a thousand-millionth of the
-    # largest force [length]
+    #: approach of first contact; of a layer without one, at a thousand-millionth of the
+    #: largest force [length]
     first: float
     body: Body
 

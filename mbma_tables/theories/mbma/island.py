@@ -41,7 +41,7 @@ class Island:
     zeta_u: Numbers
     R_d: Numbers  #: radii of the island's sphere and of its summits (26, 29) [length]
     R_u: Numbers
-    # : density [1/length^2] and standard deviation of height [length] of its summits (32)
+    #: density [1/length^2] and standard deviation of height [length] of its summits (32)
     D: Numbers
     sigma: Numbers
     h_d: Numbers  #: roughness above zeta_d (B.3) [length]
