@@ -30,6 +30,7 @@ from generate.files import ROOT
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file
+from mbma_tables.export.own_formula import certificate, rounded
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.island_models import Certificate
 from mbma_tables.theories.mbma.closed_form_certificates import RANGES
@@ -39,7 +40,6 @@ FORMS = ROOT / "mbma_tables" / "theories" / "mbma" / "closed_forms.toml"
 MODULE = ROOT / "mbma_tables" / "theories" / "mbma" / "closed_form_certificates.py"
 NUMBER = re.compile(r"\d[\d.]*(?:e-?\d+)?")
 WIDTH = 120
-DATA_DIGITS = 10
 # of a printed constant
 MIN_DIGITS = 2
 MAX_DIGITS = 15
@@ -127,12 +127,6 @@ def module_text(certificates: Mapping[str, Mapping[str, Certificate]]) -> str:
     return "\n".join([*lines, "}", ""])
 
 
-def rounded(values: FloatArray, digits: int = DATA_DIGITS) -> FloatArray:
-    """Values with that many significant digits."""
-    flat = [float(f"{value:.{digits}g}") for value in np.ravel(values).tolist()]
-    return np.array(flat).reshape(np.shape(values))
-
-
 def terms(text: str) -> list[tuple[str, str]]:
     """Terms of a sum: the fitted coefficient with its sign, "" where there is none, and the rest.
 
@@ -187,27 +181,6 @@ def least_largest(
         grown = weight * (error / largest + 1e-3)
         weight = np.maximum(grown / grown.mean(), 1e-6)
     return least_error, best_coefficients
-
-
-def certificate(
-    coefficients: int,
-    error: FloatArray,
-    arguments: Mapping[str, FloatArray],
-) -> Certificate:
-    """Certificate of held-out relative errors; the largest is rounded up."""
-    worst = int(error.argmax())
-    # of the third digit of the largest error
-    unit = 10.0 ** (math.floor(math.log10(error[worst])) - 2)
-    rounded_up = math.ceil(error[worst] / unit) * unit
-    return Certificate(
-        coefficients,
-        largest=float(f"{rounded_up:.3g}"),
-        median=float(f"{np.median(error):.3g}"),
-        points=error.size,
-        worst_at={
-            name: float(f"{values[worst]:.4g}") for name, values in arguments.items()
-        },
-    )
 
 
 @functools.cache

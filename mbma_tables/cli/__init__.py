@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from mbma_tables import __version__
-from mbma_tables.cli import commands, export, scene, tables
+from mbma_tables.cli import commands, export, formula, scene, tables
 from mbma_tables.cli.options import format_options
 from mbma_tables.common import progress
 from mbma_tables.common.errors import MbmaError
@@ -93,6 +93,8 @@ def main(context: click.Context) -> None:
         return
     progress.doing(context.invoked_subcommand)
 
+
+tables.tables_group.add_command(formula.formula_command)
 
 for command in (
     *(
