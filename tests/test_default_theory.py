@@ -22,7 +22,7 @@ from mbma_tables.cli import main
 from mbma_tables.export.explorer import explorer_page
 from mbma_tables.export.exported_law import exported_law
 from mbma_tables.export.law_rows import describe_law
-from mbma_tables.theories import Mbma, resolve
+from mbma_tables.theories import Mbma, Persson, resolve
 
 NUMBERS = {"hurst": 0.8, "q0": 0.05, "q1": 1.5, "h_rms": 0.5, "h_max": 1.75}
 E_STAR = "100 GPa"
@@ -130,6 +130,22 @@ def test_a_joint(expected, make):
     assert joint.table([PRESSURE]).attrs["theory"] == expected
     card = joint.export("csv", pressures=("100 MPa", "500 MPa"), heat=False)
     assert f"theory {expected!r}" in card
+
+
+def test_options_by_name_on_the_command_line():
+    """Every option of a theory is one of the commands, without a line of its own."""
+    surface = Surface.named("concrete")
+    words = ("contact", "--surface", "concrete", "-u", "0.6", "--json")
+    for theory, option in (
+        (Persson("simplified"), "method=simplified"),
+        (Mbma(outside="exact"), "outside=exact"),
+        (Mbma(rtol=1e-4), "rtol=1e-4"),
+    ):
+        known = contact(surface, mean_separation=0.6, theory=theory)
+        for named in ((), ("--theory", theory.name)):
+            found = json.loads(run(*words, *named, "--option", option))
+            assert found["theory"] == theory.name
+            assert found["columns"]["pressure"] == [float(known.pressure)]
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import click
@@ -41,6 +42,7 @@ class Model(NamedTuple):
     theory: Any = None  # a name or None, and after `of` an object
     hardness: float | str | None = None
     grid: str | None = None  # of theory "simulated"
+    options: Mapping[str, Any] = MappingProxyType({})  # others of the theory, by name
 
     @property
     def yields(self) -> bool:
@@ -67,7 +69,10 @@ class Model(NamedTuple):
             value = getattr(self, name)
             if value != default:
                 changed[name] = value
-        return changed
+        twice = [name for name in self.options if name in changed]
+        if twice:
+            raise InputError(f"{', '.join(twice)}: given twice, by --option too")
+        return {**changed, **self.options}
 
     def bodies(
         self, specimen: Specimen, conductivity: Sequence[float | str] | None = None
@@ -398,6 +403,20 @@ def json_option(instead: str) -> Decorator:
     )
 
 
+def _named_values(texts: Sequence[str]) -> dict[str, Any]:
+    """Values by name of texts such as "rtol=1e-4": numbers where they are, else texts."""
+    values: dict[str, Any] = {}
+    for text in texts:
+        name, separator, value = text.partition("=")
+        if not separator or not name or name in values:
+            raise InputError(f"--option takes NAME=VALUE, each name once, got {text!r}")
+        try:
+            values[name] = float(value)
+        except ValueError:
+            values[name] = value
+    return values
+
+
 SHOWN: dict[str, Any] = {"show_default": True}
 variant_option = _option(
     "variant",
@@ -435,6 +454,14 @@ grid_option = _option(
     "90% contact; half, full on half of the points along each side.",
     type=click.Choice([*GRIDS]),
 )
+theory_option_option = _option(
+    "option",
+    "Another option of the theory, by its name in the library: method=simplified of persson, "
+    "outside=exact of mbma; may be repeated.",
+    multiple=True,
+    metavar="NAME=VALUE",
+    callback=lambda ctx, param, given: _named_values(given),
+)
 # for islands, which only MBMA has
 model_options = option_group("model", lambda given: Model(**given), *_MODEL_OPTIONS)
 hardness_option = _option(
@@ -446,8 +473,9 @@ hardness_option = _option(
 )  # fmt: skip
 theory_options = option_group(
     "model",
-    lambda given: Model(**given_values(given)),
+    lambda given: Model(options=given.pop("option"), **given_values(given)),
     theory_option,
+    theory_option_option,
     grid_option,
     *_MODEL_OPTIONS,
     hardness_option,

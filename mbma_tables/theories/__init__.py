@@ -154,8 +154,11 @@ def _with_options(name: str, options: Mapping[str, Any]) -> Any:
     others = [option for option in options if option not in _options_of(name)]
     if others:
         owners = [other for other in _NAMED if others[0] in _options_of(other)]
-        of = f" of theory {owners[0]!r} alone" if owners else ""
-        raise InputError(f"{', '.join(others)}: options{of}, not of {name!r}")
+        owner = f"theory {owners[0]!r} alone" if owners else "no theory"
+        known = ", ".join(_options_of(name)) or "none"
+        raise InputError(
+            f"{', '.join(others)}: options of {owner}, not of {name!r}, which has {known}"
+        )
     return _class_of(name)(**options)
 
 

@@ -315,6 +315,12 @@ test_bad_input_of_one_command = told(
         ["contact", "-d1", "--theory", "persson", "--island-model", "exact"],
         "island_model: options of theory",
     ),
+    (["contact", "-d1", "--option", "method"], "--option takes NAME=VALUE"),
+    (
+        ["contact", "-d1", "--theory", "persson", "--option", "methods=full"],
+        "methods: options of no theory, not of 'persson', which has method",
+    ),
+    (["contact", "-d1", "--rtol", "1e-4", "--option", "rtol=1e-5"], "rtol: given twice"),
     (["contact"], "one of --separation, --mean-separation, --pressure and --area"),
     (["curve", "--points", "4"], "--points"),
     (["curve", "--plot", "c.jpg"], ".png, .svg, .pdf"),
