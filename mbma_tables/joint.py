@@ -41,6 +41,7 @@ from mbma_tables.contacts.sensitivity import (
 from mbma_tables.law.law import ContactLaw
 from mbma_tables.law.make import law_of
 from mbma_tables.materials import Pair, effective_modulus, tangential_ratio
+from mbma_tables.quantities import registry
 from mbma_tables.quantities.interface import Gas, Interface
 from mbma_tables.quantities.properties import JointQuantities
 from mbma_tables.quantities.tangential import (
@@ -66,17 +67,6 @@ EXAMPLE = '{"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um
 # pressures over the hardness, and their number, in pictures
 RANGE = (1e-5, 0.3)
 POINTS = 41
-# quantities in pictures, those that share a panel together
-DRAWN = (
-    "area",
-    "mean_separation",
-    "unloading_stiffness",
-    "tangential_stiffness",
-    "stiffness",
-    "total_conductance",
-    "solid_conductance",
-    "gas_conductance",
-)
 
 
 def equivalent(faces: Sequence[Any], nominal_area: Any) -> AnySurface:
@@ -711,8 +701,9 @@ class Joint(JointQuantities, Displayed):
 
     def _drawn(self, pressed: Contact) -> Figure:
         unit = pressed.units["pressure"]
+        names = [name for name in registry.results() if name != "pressure"]
         return draw_panels(
-            np.ravel(pressed.pressure), pressed.panels(DRAWN), f"pressure F/A0 [{unit}]"
+            np.ravel(pressed.pressure), pressed.panels(names), f"pressure F/A0 [{unit}]"
         )
 
 

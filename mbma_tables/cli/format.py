@@ -172,7 +172,7 @@ def columns_of(
     shown_names = [
         name
         for name, quantity in registry().items()
-        if quantity.is_column and quantity.is_available(pressed)
+        if quantity.is_column and quantity.is_shown(pressed)
     ]
     if uncertainties:
         stated = {registry()[name].uncertainty for name in shown_names}

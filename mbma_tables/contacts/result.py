@@ -56,6 +56,7 @@ MOST_SHOWN = 1000  # entries up to which the text includes errors, scatter and v
 OF_FALLING = ", also where a smaller one follows a larger one: that is no unloading"
 # labels of panels whose quantities do not end in it
 PANELS = {"area": "real contact area  A/A0", "mean_separation": "mean gap"}
+CURVES = ("mean_separation", "pressure", "area")
 CONDUCTANCES = ("total_conductance", "solid_conductance", "gas_conductance")
 
 
@@ -406,7 +407,7 @@ class Contact(State, Displayed):
         facts["separation_scatter"] = self._shown("separation_scatter")
         facts |= self._conductances()
         for name in ("stiffness", "unloading_stiffness"):
-            if registry.get(name).is_available(self):
+            if registry.get(name).is_shown(self):
                 facts[name] = self._shown(name)
         if not self.yields and self.bodies.units.stress != "1":
             facts["elastic_hardness"] = self._shown("elastic_hardness")
@@ -459,7 +460,7 @@ class Contact(State, Displayed):
         """Every listed quantity that is available: values, unit and meaning."""
         variables = {}
         for name, declared in registry.registry().items():
-            if declared.is_listed and declared.is_available(self):
+            if declared.is_shown(self):
                 variables[name] = Variable(
                     self.quantity(name), declared.unit(self), declared.meaning
                 )
@@ -478,7 +479,8 @@ class Contact(State, Displayed):
     def _figure(self) -> Any:
         unit = self.units["pressure"]
         title = f"hardness {shown(self.bodies.hardness, unit)}" if self.yields else ""
-        names = ("stiffness", "unloading_stiffness", *CONDUCTANCES)
+        # pressure and area against the gap have panels of their own
+        names = [name for name in registry.results() if name not in CURVES]
         return draw_compression(
             [self.curve()], title, pressure_label(unit), more=self.panels(names)
         )
@@ -493,7 +495,7 @@ class Contact(State, Displayed):
         lines: dict[str, list[Line]] = {}
         for name in names:
             declared = registry.get(name)
-            if not declared.is_available(self):
+            if not declared.is_shown(self):
                 continue
             values = np.ravel(self.quantity(name))
             if not (values > 0).any():

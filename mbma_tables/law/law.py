@@ -90,7 +90,7 @@ class LawPoint(
 
 def _refuse_energy_of_yielded(*gaps: Any, **named: Any) -> Numbers:
     """In place of the method `energy` of laws with a hardness."""
-    raise InputError(ENERGY_OF_YIELDED)
+    raise InputError(f"energy needs an elastic contact: {ENERGY_OF_YIELDED}")
 
 
 #: results of a law at separations: F/A0, A/A0, -dF/du and the energy, of their shape

@@ -34,9 +34,9 @@ def _has_unit_of_conductance(contact: State) -> bool:
 
 
 def _has_thermal_conductivity(contact: State) -> bool:
-    """Whether the conductance of the solid spots has the unit of that of a gas."""
-    if not (_has_conductivity(contact) and _has_unit_of_conductance(contact)):
-        return False
+    """Whether the conductance of the solid spots, where there is one, has the unit of that of a gas."""
+    if solid_conductance.missing(contact):
+        return True
     return contact.bodies.conductivity[1] == HEAT_CONDUCTANCE.unit(contact.unit_system)
 
 
@@ -73,7 +73,8 @@ UNIT_OF_LENGTH = Need(
 @quantity(
     HEAT_CONDUCTANCE,
     "thermal conductance of solid spots and gas in parallel, per nominal area",
-    needs=(THERMAL_CONDUCTIVITY, GAS),
+    needs=(THERMAL_CONDUCTIVITY,),
+    made_of=("solid_conductance", "gas_conductance"),
     uncertainty="total_conductance_scatter",
 )
 def total_conductance(contact: State) -> Any:
@@ -86,7 +87,7 @@ def total_conductance(contact: State) -> Any:
     "conductance of the solid spots per nominal area",
     needs=(CONDUCTIVITY, UNIT_OF_CONDUCTANCE),
     uncertainty="solid_conductance_scatter",
-    ratio_to="unloading_stiffness",
+    made_of=("unloading_stiffness",),
     unit_of_state=lambda contact: contact.bodies.conductivity[1],
 )
 def solid_conductance(contact: State) -> Any:
@@ -121,7 +122,7 @@ def gas_conductance(contact: State) -> Any:
 @quantity(
     DIMENSIONLESS,
     "model uncertainty: standard deviation of ln of the total conductance at this pressure",
-    needs=(THERMAL_CONDUCTIVITY, GAS),
+    made_of=("total_conductance",),
     is_column=False,
 )
 def total_conductance_scatter(contact: State) -> Any:
@@ -139,7 +140,7 @@ def total_conductance_scatter(contact: State) -> Any:
 @quantity(
     DIMENSIONLESS,
     "model uncertainty: standard deviation of ln of the solid conductance at this pressure",
-    needs=(CONDUCTIVITY, UNIT_OF_CONDUCTANCE),
+    made_of=("solid_conductance",),
     is_column=False,
 )
 def solid_conductance_scatter(contact: State) -> Any:
@@ -154,7 +155,7 @@ def solid_conductance_scatter(contact: State) -> Any:
 @quantity(
     DIMENSIONLESS,
     "model uncertainty: standard deviation of ln of the gas conductance at this pressure",
-    needs=(GAS, UNIT_OF_LENGTH),
+    made_of=("gas_conductance",),
     is_column=False,
 )
 def gas_conductance_scatter(contact: State) -> Any:

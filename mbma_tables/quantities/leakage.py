@@ -30,7 +30,7 @@ from mbma_tables.quantities.effective_medium import (
     contact_factor,
     wide_gap,
 )
-from mbma_tables.quantities.registry import DIMENSIONLESS, quantity
+from mbma_tables.quantities.registry import DIMENSIONLESS, on_request, quantity
 from mbma_tables.quantities.state import State
 from mbma_tables.quantities.validity import reasons_with_masks, valid_where_none
 from mbma_tables.surfaces.any_surface import agree
@@ -485,7 +485,7 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
     "flow coefficient K: flow per length of seal is K dp/(12 viscosity width)",
     uncertainty="leakage_scatter",
     is_column=False,
-    is_listed=False,
+    is_listed=on_request,
 )
 def flow_coefficient(contact: State) -> Any:
     """Flow coefficient K of the gaps [length^3], `leakage.K`."""
@@ -496,7 +496,7 @@ def flow_coefficient(contact: State) -> Any:
     Dimension(length=1),
     "hydraulic aperture K^(1/3)",
     is_column=False,
-    is_listed=False,
+    is_listed=on_request,
 )
 def hydraulic_aperture(contact: State) -> Any:
     """K^(1/3) [length], the gap of parallel plates with the same flow."""
@@ -507,7 +507,7 @@ def hydraulic_aperture(contact: State) -> Any:
     DIMENSIONLESS,
     "model uncertainty: standard deviation of ln K",
     is_column=False,
-    is_listed=False,
+    is_listed=on_request,
 )
 def leakage_scatter(contact: State) -> Any:
     """Model uncertainty, one standard deviation of ln of the flow coefficient."""

@@ -6,14 +6,14 @@ import numpy as np
 
 from mbma_tables.common.units import Dimension
 from mbma_tables.materials import ELASTIC_PSI
-from mbma_tables.quantities.registry import DIMENSIONLESS, quantity
+from mbma_tables.quantities.registry import (
+    DIMENSIONLESS,
+    of_yielding_contacts,
+    quantity,
+)
 from mbma_tables.quantities.state import State
 
 STRESS = Dimension(stress=1)
-
-
-def _yields(contact: State) -> bool:
-    return contact.yields
 
 
 @quantity(STRESS, "force over nominal area", uncertainty="scatter")
@@ -37,7 +37,11 @@ def mean_pressure(contact: State) -> Any:
         return contact.pressure / contact.area
 
 
-@quantity(DIMENSIONLESS, "share of the contact area at the hardness", applies=_yields)
+@quantity(
+    DIMENSIONLESS,
+    "share of the contact area at the hardness",
+    is_listed=of_yielding_contacts,
+)
 def yielded(contact: State) -> Any:
     """Share of the contact area at the hardness, 0 to 1."""
     if not contact.yields:
@@ -45,7 +49,12 @@ def yielded(contact: State) -> Any:
     return contact.of_loading("yielded")
 
 
-@quantity(DIMENSIONLESS, "plasticity index E* g/p_m", applies=_yields, is_column=False)
+@quantity(
+    DIMENSIONLESS,
+    "plasticity index E* g/p_m",
+    is_column=False,
+    is_listed=of_yielding_contacts,
+)
 def psi(contact: State) -> Any:
     """Plasticity index E* g/p_m, g the rms gradient; 0 where the hardness is infinite."""
     return (contact.E_star * contact.surface.rms_gradient / contact.bodies.hardness)[()]

@@ -189,7 +189,7 @@ class ContactQuantities:
     def stiffness_scatter(self) -> Numbers:
         """Model uncertainty, one standard deviation of ln `stiffness` at this pressure.
 
-        NaN where a hardness is given: the slope of the loading curve of contacts that yield was
+        NaN where a hardness is given that anything reaches: the slope of the loading curve of contacts that yield was
         not compared with simulations; `unloading_stiffness_scatter` is that of their unloading
         stiffness.
         """
@@ -521,7 +521,7 @@ class LawQuantities:
     ) -> Numbers:
         """Model uncertainty, one standard deviation of ln `stiffness` at this pressure.
 
-        NaN where a hardness is given: the slope of the loading curve of contacts that yield was
+        NaN where a hardness is given that anything reaches: the slope of the loading curve of contacts that yield was
         not compared with simulations; `unloading_stiffness_scatter` is that of their unloading
         stiffness.
         """
@@ -726,7 +726,7 @@ class JointQuantities:
     def stiffness_scatter(self: Any, pressure: ArrayLike | str) -> Numbers:
         """Model uncertainty, one standard deviation of ln `stiffness` at this pressure.
 
-        NaN where a hardness is given: the slope of the loading curve of contacts that yield was
+        NaN where a hardness is given that anything reaches: the slope of the loading curve of contacts that yield was
         not compared with simulations; `unloading_stiffness_scatter` is that of their unloading
         stiffness.
         """

@@ -42,6 +42,21 @@ class Need:
     remedy: str  # how to give it
 
 
+def of_all_contacts(state: State) -> bool:
+    """Whether a quantity is listed: of every contact."""
+    return True
+
+
+def on_request(state: State) -> bool:
+    """Whether a quantity is listed: of no contact."""
+    return False
+
+
+def of_yielding_contacts(state: State) -> bool:
+    """Whether a quantity is listed: of contacts with a hardness, since others have it under another name or as 0."""
+    return state.yields
+
+
 @dataclasses.dataclass(frozen=True)
 class Quantity:
     """Declaration of a quantity, all that anyone who shows it needs to know."""
@@ -52,33 +67,42 @@ class Quantity:
     notes: str  # docstring of the function that computes it
     compute: Callable[[State], Any]
     needs: tuple[Need, ...] = ()
-    applies: Callable[[State], bool] | None = (
-        None  # whether it is shown of a contact; of all where it is None
-    )
+    #: names of the quantities that it is computed from, whose needs are needs of its own
+    made_of: tuple[str, ...] = ()
     #: name of the quantity that holds its model uncertainty, None where it has none of its own
     uncertainty: str | None = None
-    #: curve of a law to which it is proportional, for the bodies of that law: rows and
-    #: code write it as such
-    ratio_to: str | None = None
     is_column: bool = True  # whether tables in a terminal have it
-    # whether datasets have it without being asked, since it takes no further simulation
-    is_listed: bool = True
+    # whether datasets and tables have it without being asked: not where it takes a further
+    # simulation, nor of contacts of which it says nothing new
+    is_listed: Callable[[State], bool] = of_all_contacts
     unit_of_state: Callable[[State], str] | None = (
         None  # where the unit depends on what the user gave
     )
 
+    @property
+    def is_result(self) -> bool:
+        """Whether pictures and sensitivities have it without being asked: columns with a model uncertainty."""
+        return self.is_column and self.uncertainty is not None
+
     def missing(self, state: State) -> list[Need]:
-        """What it needs and was not given."""
-        return [need for need in self.needs if not need.is_given(state)]
+        """What it needs and was not given, for itself or for the quantities that it is made of."""
+        missing = [need for need in self.needs if not need.is_given(state)]
+        for name in self.made_of:
+            missing += [need for need in get(name).missing(state) if need not in missing]
+        return missing
 
     def is_available(self, state: State) -> bool:
-        """Whether it can be shown of a contact: all it needs is given, and it applies."""
-        return not self.missing(state) and (self.applies is None or self.applies(state))
+        """Whether a contact has it: all it needs is given."""
+        return not self.missing(state)
+
+    def is_shown(self, state: State) -> bool:
+        """Whether a contact shows it without being asked."""
+        return self.is_available(state) and self.is_listed(state)
 
     def of(self, state: State) -> Any:
         """Its value, or an error that names what is missing."""
         if missing := self.missing(state):
-            remedies = "; ".join(need.remedy for need in missing)
+            remedies = "; ".join(dict.fromkeys(need.remedy for need in missing))
             names = " and ".join(need.name for need in missing)
             raise MissingError(f"{self.name} needs {names}, which is missing: {remedies}")
         return self.compute(state)
@@ -128,6 +152,11 @@ def registry() -> Mapping[str, Quantity]:
                 )
             quantities[name] = declaration
     return quantities
+
+
+def results() -> list[str]:
+    """Names of the quantities that pictures and sensitivities have without being asked."""
+    return [name for name, declared in registry().items() if declared.is_result]
 
 
 def get(name: str) -> Quantity:

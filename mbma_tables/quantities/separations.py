@@ -3,7 +3,7 @@
 from typing import Any
 
 from mbma_tables.common.units import Dimension
-from mbma_tables.quantities.registry import quantity
+from mbma_tables.quantities.registry import of_yielding_contacts, quantity
 from mbma_tables.quantities.state import State
 
 LENGTH = Dimension(length=1)
@@ -24,7 +24,7 @@ def separation(contact: State) -> Any:
 @quantity(
     LENGTH,
     "gap between mean planes",
-    applies=lambda contact: contact.yields,
+    is_listed=of_yielding_contacts,
     is_column=False,
 )
 def plane_separation(contact: State) -> Any:

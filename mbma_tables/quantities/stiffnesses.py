@@ -2,9 +2,8 @@
 
 from typing import Any
 
-from mbma_tables.common.errors import MissingError
 from mbma_tables.common.units import Dimension
-from mbma_tables.quantities.registry import Need, quantity
+from mbma_tables.quantities.registry import Need, of_yielding_contacts, quantity
 from mbma_tables.quantities.state import State
 from mbma_tables.quantities.tangential import tangential_ratio_of
 
@@ -13,8 +12,11 @@ ENERGY = Dimension(stress=1, length=1)
 
 # of contacts and of their laws
 ENERGY_OF_YIELDED = (
-    "energy: the energy that a yielded contact gives back is not known, since its residual "
+    "the energy that a yielded contact gives back is not known, since its residual "
     "shape is not; unloading_stiffness is the initial stiffness of unloading"
+)
+NO_HARDNESS = Need(
+    "an elastic contact", lambda contact: not contact.yields, ENERGY_OF_YIELDED
 )
 
 POISSONS_RATIO = Need(
@@ -38,7 +40,7 @@ def stiffness(contact: State) -> Any:
     STIFFNESS,
     "-dF/du per nominal area, of a small unloading",
     uncertainty="unloading_stiffness_scatter",
-    applies=lambda contact: contact.yields,
+    is_listed=of_yielding_contacts,
 )
 def unloading_stiffness(contact: State) -> Any:
     """-d(F/A0)/du [stress/length] of a small unloading at constant contact area; `stiffness` if nothing yields."""
@@ -52,7 +54,7 @@ def unloading_stiffness(contact: State) -> Any:
     "shear stress over displacement before slip",
     needs=(POISSONS_RATIO,),
     uncertainty="unloading_stiffness_scatter",
-    ratio_to="unloading_stiffness",
+    made_of=("unloading_stiffness",),
 )
 def tangential_stiffness(contact: State) -> Any:
     """Tangential stiffness of full stick [stress/length], `unloading_stiffness`/kappa (Mindlin 1949)."""
@@ -63,13 +65,11 @@ def tangential_stiffness(contact: State) -> Any:
     ENERGY,
     "elastic energy per nominal area",
     uncertainty="scatter",
-    applies=lambda contact: not contact.yields,
+    needs=(NO_HARDNESS,),
     is_column=False,
 )
 def energy(contact: State) -> Any:
     """Elastic energy per nominal area [stress length], the integral of F/A0 over u; of elastic contacts alone."""
-    if contact.yields:
-        raise MissingError(ENERGY_OF_YIELDED)
     return contact.evaluate(
         lambda theory, surface, u, E_star: (E_star * theory.energy(surface, u),)
     )[0]

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 from generate.quantities import FILE, properties
 from mbma_tables import Bodies, InputError, Joint, Surface, contact, contact_law
 from mbma_tables.cli import main
+from mbma_tables.common.errors import MissingError
 from mbma_tables.common.units import (
     ELECTRICAL_CONDUCTANCE,
     HEAT_CONDUCTANCE,
@@ -186,3 +187,43 @@ def test_a_contact_made_of_one_quantity_has_the_others():
             else:
                 with pytest.raises(InputError, match=f"needs one of.*made with {one}"):
                     made.quantity(name)
+
+
+def test_a_quantity_made_of_others_needs_what_these_need(thermal_time):
+    """What was computed from the energy was shown of yielded contacts, and ended in the energy's error."""
+    elastic = contact(FACE, "57.5 GPa", pressure="10 MPa", theory="calibrated")
+    assert elastic.energy_depth == elastic.energy / elastic.pressure
+    assert "energy_depth" in elastic.variables()
+    yielded = contact(FACE, METALS, pressure="10 MPa", theory="calibrated")
+    for name in ("energy", "energy_depth"):
+        assert name not in yielded.available()
+        with pytest.raises(
+            MissingError, match=f"{name} needs an elastic contact.*residual shape"
+        ):
+            yielded.quantity(name)
+
+
+def test_what_is_missing_of_a_total_is_named_once(thermal_time):
+    joint = Joint(FACE, bodies="57.5 GPa", theory="calibrated")
+    with pytest.raises(MissingError) as error:
+        _ = joint.at_pressure("10 MPa").total_conductance
+    text = str(error.value)
+    assert text.count("Bodies(") == 1
+    assert text.startswith("total_conductance needs conductivity, which")
+    electrical = Bodies("57.5 GPa", conductivity="6e6 S/m")
+    joint = Joint(FACE, bodies=electrical, theory="calibrated")
+    with pytest.raises(MissingError, match="total_conductance needs thermal cond"):
+        _ = joint.at_pressure("10 MPa").total_conductance
+
+
+def test_available_are_all_quantities_that_a_contact_gives():
+    """Those of contacts that yield were left out of elastic ones, which give them, too."""
+    for pressed in contacts_of_all_kinds():
+        given = []
+        for name in registry.registry():
+            try:
+                pressed.quantity(name)
+            except InputError:
+                continue
+            given.append(name)
+        assert pressed.available() == given
