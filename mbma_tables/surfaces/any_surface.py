@@ -201,26 +201,45 @@ class AnySurface(Displayed, abc.ABC):
             f"spectrum C(q) [{length}^4]",
         )
 
-    def combined(self, other: AnySurface, nominal_area: float | str | None = None) -> Any:
+    def in_unit_of(self, other: AnySurface) -> Self:
+        """The same surface in the unit of another; an error if only one of them has a unit."""
+        if (self.unit is None) != (other.unit is None):
+            raise InputError(
+                f"one surface is in {other.unit or self.unit!r}, the unit of the other "
+                "is not known: make it with unit=..."
+            )
+        return self if self.unit == other.unit else self.to(str(other.unit))
+
+    def power_law_with(self, other: AnySurface) -> Any:
+        """The sum with a surface in the same unit where it is one power law; None where it is not."""
+        return None
+
+    def combined(
+        self, other: AnySurface, nominal_area: ArrayLike | str | None = None
+    ) -> Any:
         """The equivalent rough surface of two in contact: spectra add, heights convolve.
 
         Parameters
         ----------
         other : AnySurface
             The other surface; both are independent of each other.
-        nominal_area : float or str, optional
+        nominal_area : array_like or str, optional
             A0 [length^2], which determines the highest point, as for `Surface`.
 
         Returns
         -------
-        MeasuredSurface
-            Its h_max is exceeded by as small a share of heights as those of both: for
-            Gaussian surfaces the root of the sum of squares. It has the unit of the first.
+        Surface or MeasuredSurface
+            In the unit of the first. Of two self-affine surfaces with the same q0, q1 and
+            Hurst exponent a `Surface`, for arrays of them a batch of the broadcast shape;
+            of all others a `MeasuredSurface`. Its h_max is exceeded by as small a share of
+            heights as those of both: for Gaussian surfaces the root of the sum of squares.
 
         Raises
         ------
         InputError
-            For a batch, and if only one has a unit.
+            If only one has a unit.
+        OutOfRangeError
+            For batches of which some entries differ in q0, q1 or Hurst exponent.
 
         Examples
         --------
@@ -230,8 +249,18 @@ class AnySurface(Displayed, abc.ABC):
         >>> both = one.combined(other)
         >>> f"h_rms = {both.h_rms:.2f}, h_max = {both.h_max:.1f}, q from {both.q0:g} to {both.q1:g}"
         'h_rms = 5.00, h_max = 15.0, q from 0.01 to 5'
+
+        Many joints at once, of faces that have their band in common:
+
+        >>> ground = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=[0.3, 0.4, 0.5], h_max=2.0)
+        >>> milled = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.2, h_max=5.0)
+        >>> ground.combined(milled).h_rms.round(3)
+        array([1.237, 1.265, 1.3  ])
         """
-        both = self.sampled().added(other.sampled())
+        other = other.in_unit_of(self)
+        both = self.power_law_with(other)
+        if both is None:
+            both = self.sampled().added(other.sampled())
         return (
             both
             if nominal_area is None

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import (
+    FloatArray,
     broadcast_shape,
     finite_array,
     hinted,
@@ -21,10 +22,10 @@ from mbma_tables.common.arguments import (
     spread,
 )
 from mbma_tables.common.display import shown
-from mbma_tables.common.errors import InputError
+from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.units import Units
 from mbma_tables.surfaces import spectrum
-from mbma_tables.surfaces.any_surface import AnySurface, frozen
+from mbma_tables.surfaces.any_surface import AnySurface, apply, frozen, refuse_plain
 from mbma_tables.surfaces.heights import of_area
 from mbma_tables.surfaces.roughness import surface_of_roughness
 
@@ -34,6 +35,9 @@ if TYPE_CHECKING:
 LARGEST = 1e50  # limit of lengths and wavenumbers, so that their powers stay finite
 SHOWN = 6  # entries of a batch that are printed
 PARAMETERS = ("hurst", "q0", "q1", "h_rms", "h_max")
+BAND = PARAMETERS[:3]
+# relative difference of numbers that are the same but for the rounding of units
+SAME = 1e-12
 
 
 class Case(NamedTuple):
@@ -373,6 +377,35 @@ class SelfAffine(AnySurface):
             )
         return type(self)(*numbers, unit=self.unit, provenance=records)
 
+    def power_law_with(self, other: AnySurface) -> Any:
+        """The sum with a surface in the same unit where it is one power law; None where it is not.
+
+        A batch is such a sum in every entry, or refused.
+        """
+        if not isinstance(other, SelfAffine) or self.resolution or other.resolution:
+            return None
+        numbers = [getattr(self, name) for name in PARAMETERS]
+        numbers += [getattr(other, name) for name in PARAMETERS]
+        if self.labelled or other.labelled:
+            names = [
+                f"{name} of {which}" for which in ("one", "other") for name in PARAMETERS
+            ]
+            refuse_plain(dict(zip(names, numbers, strict=True)))
+            h_rms, h_max = apply(_added, tuple(numbers), outputs=2)
+        elif self.shape == other.shape == () and not _same_band(*numbers):
+            return None
+        else:
+            broadcast_shape(one=self.h_rms, other=other.h_rms)
+            h_rms, h_max = _added(*numbers)
+        record = {
+            "step": "combined",
+            "of": [list(self.provenance), list(other.provenance)],
+        }
+        band = {name: getattr(self, name) for name in BAND}
+        return type(self)(
+            **band, h_rms=h_rms, h_max=h_max, unit=self.unit, provenance=(record,)
+        )
+
     def power_spectrum(self, q: ArrayLike) -> Any:
         """C(q) of Eq. (6) [length^4], zero outside [q0, q1]; a batch broadcasts against q."""
         wavenumber = positive_array("q", q)
@@ -381,6 +414,33 @@ class SelfAffine(AnySurface):
         return np.where(
             inside, scale * (wavenumber / self.q0) ** (-2 - 2 * self.hurst), 0.0
         )[()]
+
+
+def _same_band(*numbers: Any) -> FloatArray:
+    """Mask of pairs of surfaces, each by its `PARAMETERS`, with the same band and Hurst exponent."""
+    count = len(PARAMETERS)
+    pairs = zip(numbers[: len(BAND)], numbers[count : count + len(BAND)], strict=True)
+    alike = [np.isclose(one, other, rtol=SAME, atol=0.0) for one, other in pairs]
+    return np.asarray(np.logical_and.reduce(np.broadcast_arrays(*alike)))
+
+
+def _added(*numbers: Any) -> tuple[Any, Any]:
+    """h_rms and h_max of the sums of two surfaces, each by its `PARAMETERS`.
+
+    Variances add, and of Gaussian heights the squares of the highest points.
+    """
+    same = _same_band(*numbers)
+    if not same.all():
+        places = ", ".join(
+            str(tuple(place)) for place in np.argwhere(~same)[:SHOWN].tolist()
+        )
+        raise OutOfRangeError(
+            f"two surfaces of a batch have different q0, q1 or hurst, at {places}: the sum of "
+            "their spectra is no power law, and known of one surface at a time",
+            ~same,
+        )
+    heights, tops = numbers[3::5], numbers[4::5]
+    return np.hypot(*heights), np.hypot(*tops)
 
 
 def _shown(value: Any) -> str:

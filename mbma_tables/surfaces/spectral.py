@@ -380,14 +380,7 @@ class SpectralSurface(AnySurface):
         )
 
     def added(self, other: SpectralSurface) -> Self:
-        """The equivalent surface of two; see `AnySurface.combined`."""
-        if (self.unit is None) != (other.unit is None):
-            raise InputError(
-                f"one surface is in {self.unit or other.unit!r}, the unit of the other "
-                "is not known: make it with unit=..."
-            )
-        if self.unit is not None:
-            other = other.to(self.unit)
+        """The equivalent surface of two in one unit; see `AnySurface.combined`."""
         low = min(self.q0, other.q0)
         high = max(self.q1, other.q1)
         fine = np.geomspace(

@@ -10,15 +10,17 @@ import pytest
 from helpers import random_map, refusals, run
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import mutually_broadcastable_shapes
 
 from generate.machined.makers import rough
-from mbma_tables import InputError, Surface, contact, contact_law
+from mbma_tables import Bodies, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.export.law_rows import describe_law
+from mbma_tables.quantities.leakage import shipped_flow
 from mbma_tables.surfaces.averages import average
 from mbma_tables.surfaces.heights import SHARES, Heights
 from mbma_tables.surfaces.maps import extrapolated
 from mbma_tables.surfaces.spectrum import PowerLaws
-from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.surfaces.surface import MeasuredSurface, assumptions
 
 FIVE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.5, h_max=4.0)
 # a plateau, a rise, a jump and a gap
@@ -197,12 +199,120 @@ class TestCombined:
             np.sqrt(m2 @ (square / (1 + square)) / (m2 @ (1 / (1 + square))))
         )
         assert one.combined(FIVE).anisotropy < one.anisotropy
-        assert FIVE.combined(FIVE).anisotropy is None
+        broad = dataclasses.replace(FIVE, q1=2 * FIVE.q1)
+        assert FIVE.combined(broad).anisotropy is None
+
+    @pytest.mark.parametrize("theory", ["calibrated", "persson", "mbma"])
+    @pytest.mark.parametrize(
+        ("hurst", "q1", "area"), [(0.8, 2.0, None), (0.5, 1.28, 4e6), (0.3, 1.0, None)]
+    )
+    def test_a_common_band_gives_the_numbers_of_the_spectral_sum(
+        self, hurst: float, q1: float, area: float | None, theory: str
+    ):
+        """Five numbers answer as the sum of both spectra does, within the errors that both state."""
+        one = Surface(hurst, 0.01, q1, 3.0, 11.0, unit="um")
+        other = Surface(hurst, 10.0, 1e3 * q1, 0.8e-3, 3.5e-3, unit="mm")
+        both = one.combined(other, area)
+        assert isinstance(both, Surface)
+        assert both.unit == "um"
+        spectral = one.sampled().added(other.to("um").sampled())
+        if area is not None:
+            spectral = dataclasses.replace(spectral, h_max=None, nominal_area=area)
+        for name in ("h_rms", "h_max", "q0", "q1", "m2", "m4"):
+            known = getattr(spectral, name)
+            assert getattr(both, name) == pytest.approx(known, rel=1e-10), name
+        gaps = np.array([0.02, 0.1, 0.3, 0.5, 0.7, 0.9]) * both.h_max
+        for bodies in (
+            Bodies("60 GPa"),
+            Bodies("60 GPa", hardness="1.5 GPa", conductivity="50 W/(m K)"),
+        ):
+            found, known = (
+                contact(surface, bodies, mean_separation=gaps, theory=theory)
+                for surface in (both, spectral)
+            )
+            within = found.error + known.error + 1e-10
+            for name in ("pressure", "area"):
+                ratio = getattr(found, name) / getattr(known, name)
+                assert (np.abs(ratio - 1) <= within).all(), name
+            np.testing.assert_array_equal(found.valid, known.valid)
+            assert {reason: mask.tolist() for reason, mask in found.reasons.items()} == {
+                reason: mask.tolist() for reason, mask in known.reasons.items()
+            }
+            np.testing.assert_allclose(found.scatter, known.scatter, rtol=1e-5)
+            flows = found.leakage.K, known.leakage.K
+            np.testing.assert_allclose(*flows, rtol=math.expm1(shipped_flow().error))
+
+    def test_a_common_band_keeps_what_both_faces_assume_and_doubt(self):
+        numbers = {"hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+        ground = Surface.from_roughness(
+            Rq="0.4 um", h_max="2 um", process="ground", **numbers
+        )
+        plain = Surface.from_roughness(Ra="0.7 um", h_max="3 um", **numbers)
+        both = ground.combined(plain)
+        assert isinstance(both, Surface)
+        spectral = ground.sampled().added(plain.sampled())
+        assert both.provenance == spectral.provenance
+        assert both.doubts == spectral.doubts
+        assert both.doubts
+        assert both.departures() == spectral.departures()
+        assert assumptions(both) == assumptions(spectral)
+
+    @given(
+        of_one=mutually_broadcastable_shapes(num_shapes=2, max_dims=2, max_side=3),
+        seed=st.integers(0, 2**32 - 1),
+    )
+    def test_batches_are_sums_of_their_entries(self, of_one, seed: int):
+        rng = np.random.default_rng(seed)
+        tops, areas = of_one.input_shapes
+        one = Surface(
+            rng.uniform(0.3, 1.0, tops[-1:]), 0.01, 2.0, rng.uniform(1, 2, tops), 9.0
+        )
+        hurst = np.broadcast_to(one.hurst, of_one.result_shape)
+        other = Surface(hurst, 0.01, 2.0, rng.uniform(1, 2, areas), 7.0)
+        both = one.combined(other)
+        assert both.shape == of_one.result_shape
+        for place in np.ndindex(both.shape):
+            first, second, known = (
+                Surface(
+                    *(
+                        np.broadcast_to(getattr(surface, name), both.shape)[place]
+                        for name in surface.parameters
+                    )
+                )
+                for surface in (one, other, both)
+            )
+            alone = first.combined(second)
+            assert all(getattr(alone, n) == getattr(known, n) for n in alone.parameters)
+
+    def test_labelled_batches_keep_their_names(self):
+        xr = pytest.importorskip("xarray")
+        heights = xr.DataArray([1.0, 2.0], dims="ground")
+        one = dataclasses.replace(FIVE, h_rms=heights)
+        other = dataclasses.replace(
+            FIVE, h_rms=xr.DataArray([0.5, 0.7, 0.9], dims="milled").chunk(milled=1)
+        )
+        both = one.combined(other)
+        assert both.h_rms.sizes == {"ground": 2, "milled": 3}
+        assert both.h_rms.chunks is not None
+        expected = np.hypot([[1.0], [2.0]], [0.5, 0.7, 0.9])
+        np.testing.assert_array_equal(both.h_rms.compute(), expected)
+        with pytest.raises(InputError, match="beside DataArrays"):
+            one.combined(dataclasses.replace(FIVE, h_rms=np.array([1.0, 2.0])))
+        narrow = dataclasses.replace(other, q1=1.0)
+        with pytest.raises(OutOfRangeError, match="one surface at a time"):
+            one.combined(narrow).h_rms.compute()
 
     def test_a_batch_is_refused(self):
         with pytest.raises(InputError, match="one surface at a time"):
             Surface(hurst=[0.5, 0.8], q0=0.01, q1=2.0, h_rms=1.5, h_max=4.0).combined(
                 FIVE
+            )
+        with pytest.raises(OutOfRangeError, match=r"at \(0,\)") as refused:
+            Surface([0.5, 0.8], 0.01, 2.0, 1.5, 4.0).combined(FIVE)
+        assert refused.value.mask.tolist() == [True, False]
+        with pytest.raises(InputError, match="do not broadcast"):
+            Surface(0.8, 0.01, 2.0, [1.5, 1.6], 4.0).combined(
+                Surface(0.8, 0.01, 2.0, [1.5, 1.6, 1.7], 4.0)
             )
 
 
