@@ -9,10 +9,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.common.arguments import (
-    FloatArray,
     broadcast_shape,
     finite_array,
     hinted,
@@ -416,12 +415,12 @@ class SelfAffine(AnySurface):
         )[()]
 
 
-def _same_band(*numbers: Any) -> FloatArray:
+def _same_band(*numbers: Any) -> NDArray[np.bool_]:
     """Mask of pairs of surfaces, each by its `PARAMETERS`, with the same band and Hurst exponent."""
     count = len(PARAMETERS)
     pairs = zip(numbers[: len(BAND)], numbers[count : count + len(BAND)], strict=True)
     alike = [np.isclose(one, other, rtol=SAME, atol=0.0) for one, other in pairs]
-    return np.asarray(np.logical_and.reduce(np.broadcast_arrays(*alike)))
+    return np.asarray(np.logical_and.reduce(np.broadcast_arrays(*alike)), dtype=bool)
 
 
 def _added(*numbers: Any) -> tuple[Any, Any]:
