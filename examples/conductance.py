@@ -28,9 +28,9 @@ from mbma_tables.bodies import mean_conductivity
 from mbma_tables.common.plots import to_picture
 from mbma_tables.quantities.conductances import cooper_mikic_yovanovich
 
-# both faces' roughness in one
+# both faces' roughness in one: wavelengths from 1 mm to 8 um
 JOINT = Surface(
-    hurst=0.8, q0=2 * np.pi / 1e-3, q1=2 * np.pi / 5e-6, h_rms=1.5e-6, h_max=5.5e-6
+    hurst=0.8, q0=2 * np.pi / 1e-3, q1=2 * np.pi / 8e-6, h_rms=1.5e-6, h_max=5.5e-6
 )
 STEEL = materials.get("steel 4140")
 ALUMINIUM = materials.get("aluminium 6061")
@@ -76,7 +76,8 @@ def conductance_curve(points: int = 200) -> Curve:
     h = {
         p_m: K_MEAN / E_STAR * found.unloading_stiffness for p_m, found in joints.items()
     }
-    spread = np.exp(joints[middle].scatter)
+    # of the stiffness at a pressure, as h is: `scatter` is that of the force at a gap
+    spread = np.exp(joints[middle].unloading_stiffness_scatter)
     slope = np.sqrt(2 * JOINT.m2 / np.pi)
     return Curve(
         pressure,
@@ -96,25 +97,31 @@ def conductance_curve(points: int = 200) -> Curve:
 
 
 def draw(curve: Curve) -> Figure:
-    """Conductance against pressure, logarithmic."""
+    """Conductance over pressure: nearly in proportion, their ratio shows the differences."""
     figure = Figure(figsize=(7, 5), layout="constrained")
     axes = figure.subplots()
     p = curve.pressure / 1e6
+    lines = {
+        "calibrated law, the aluminium yields": (curve.conductance, "C0-"),
+        "calibrated law, elastic": (curve.elastic, "C1--"),
+        "slope of the loading curve in place of unloading": (curve.loading_slope, "C2:"),
+        "Cooper, Mikic, Yovanovich 1969 (plastic)": (curve.plastic_correlation, "k-."),
+        "Mikic 1974 (elastic)": (curve.elastic_correlation, "C7-."),
+    }
+    for label, (h, style) in lines.items():
+        axes.semilogx(p, h / p, style, label=label)
     axes.fill_between(
         p,
-        curve.low,
-        curve.high,
+        curve.low / p,
+        curve.high / p,
         alpha=0.25,
-        label="temper of the aluminium, scatter of simulations",
+        label="where it yields: tempers of the aluminium and model uncertainty",
     )
-    axes.loglog(p, curve.conductance, label="with yield")
-    axes.loglog(p, curve.elastic, "--", label="elastic")
-    axes.loglog(p, curve.loading_slope, ":", label="slope of the loading curve: wrong")
-    axes.loglog(
-        p, curve.plastic_correlation, "-.", label="Cooper, Mikic, Yovanovich 1969"
+    axes.set(
+        xlabel="nominal pressure p [MPa]",
+        ylabel="conductance over pressure, h/p [W/(m² K MPa)]",
+        ylim=(0, None),
     )
-    axes.loglog(p, curve.elastic_correlation, "-.", label="Mikic 1974")
-    axes.set(xlabel="nominal pressure p [MPa]", ylabel="h [W/(m^2 K)]")
     axes.grid(True, alpha=0.3)
     axes.legend(fontsize=8)
     return figure

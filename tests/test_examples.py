@@ -11,14 +11,17 @@ import pytest
 from click.testing import CliRunner
 from helpers import assert_same_output
 
-from mbma_tables import Surface, contact
+from mbma_tables import Bodies, Surface, contact
 from mbma_tables.theories import Mbma
 
 pytest.importorskip("matplotlib")
 
 ROOT = pathlib.Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
-PAGE = (ROOT / "docs" / "examples.md").read_text(encoding="utf-8")
+PAGES = "".join(
+    (ROOT / "docs" / name).read_text(encoding="utf-8")
+    for name in ("examples.md", "lookup.md")
+)
 NEEDS = {"scatter": "dask", "heat": "skfem", "newton": "skfem"}
 
 
@@ -91,6 +94,25 @@ def test_scatter_is_the_exact_island_model_sample_by_sample(tmp_path):
         assert spread.force[k] == pytest.approx(exact.pressure, rel=1.2e-6, abs=0)
 
 
+def test_the_band_of_a_conductance_is_the_model_uncertainty_of_conductance():
+    module = load("conductance")
+    curve = module.conductance_curve(20)
+    conductivities = module.K_STEEL, module.K_ALUMINIUM
+    middle, soft = (
+        contact(
+            module.JOINT,
+            Bodies(module.E_STAR, hardness=hardness, conductivity=conductivities),
+            pressure=curve.pressure,
+            theory="calibrated",
+        )
+        for hardness in (np.sqrt(module.SOFT * module.HARD), module.SOFT)
+    )
+    np.testing.assert_allclose(curve.conductance, middle.solid_conductance, rtol=1e-9)
+    high = soft.solid_conductance * np.exp(middle.solid_conductance_scatter)
+    np.testing.assert_allclose(curve.high, high, rtol=1e-9)
+    assert np.isfinite(high).sum() >= 10
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "size"),
@@ -106,13 +128,13 @@ def test_runs_as_a_script(name, size, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["bearing", "heat", "fracture"])
+@pytest.mark.parametrize("name", ["bearing", "heat", "fracture", "conductance"])
 def test_an_example_prints_what_its_page_shows(name, tmp_path):
     ran = CliRunner().invoke(
         load(name).command, ["--out", str(tmp_path / "own.svg")], catch_exceptions=False
     )
     shown = re.search(
-        rf"`python examples/{name}\.py`.*?\n\n((?:    [^\n]*\n)+)", PAGE, re.S
+        rf"`python examples/{name}\.py`.*?\n\n((?:    [^\n]*\n)+)", PAGES, re.S
     )[1]
     assert_same_output(ran.output, shown, rtol=0.02)
     assert b"<svg" in (tmp_path / "own.svg").read_bytes()
