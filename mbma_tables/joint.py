@@ -205,7 +205,10 @@ class Joint(JointQuantities, Displayed):
                 options = {key: value for key, value in part.items() if key != "map"}
                 return Surface.from_map(part["map"], **options)
             if "nominal_area" in part:
-                raise InputError("nominal_area is of the joint: give it beside the parts")
+                raise InputError(
+                    "nominal_area is of the joint, Joint(part_a, part_b, nominal_area=...), "
+                    "in a file above the tables of the parts"
+                )
             made: AnySurface = Surface.from_roughness(
                 **part, nominal_area=self.nominal_area
             )

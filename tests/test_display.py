@@ -247,6 +247,12 @@ test_misspelt_arguments_get_a_hint = refusals(
     ),
     (lambda: Surface.from_moments(H=0.7), "did you mean 'hurst'[?]"),
     (lambda: Surface.from_roughness(rq=0.7), "did you mean 'Rq'[?]"),
+    (
+        lambda: Surface.from_roughness(Rz=0.7),
+        "^Surface.from_roughness has no argument 'Rz': a peak-to-valley height is no rms",
+    ),
+    (lambda: Surface.from_roughness(lambda_c=0.7), "longest wavelength .* longest="),
+    (lambda: Surface(Ra=0.7, hurst=0.8), "from_roughness takes roughness parameters"),
     (lambda: Surface.from_spectrum([1], [1], hmax=1), "did you mean 'h_max'[?]"),
     error=TypeError,
 )

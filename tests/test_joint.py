@@ -419,11 +419,20 @@ def test_effects_that_are_not_called_for_cost_nothing(joint, monkeypatch):
         ({"part_b": "face.sur"}, "part_b is a surface, or its numbers by name"),
         (
             {"part_b": {"Ra": "1.6 um"}},
-            r"part_b: roughness has Ra, .*missing: hurst.*two of longest, shortest",
+            r"part_b: roughness has Ra, .*missing: hurst.*two of longest, shortest"
+            r".*lambda_c is longest.*docs/howto/roughness.md, 'From Ra and a filter",
+        ),
+        (
+            {"nominal_area": None},
+            r"part_a: roughness has .*one of h_max, Sp, nominal_area \(the last of a joint",
+        ),
+        (
+            {"part_b": {"Rz": "6 um"}},
+            r"part_b: Surface.from_roughness has no argument 'Rz': .*is no rms height",
         ),
         ({"part_b": FACE | {"Rqq": "1.6 um"}}, "part_b: .*no argument 'Rqq'"),
         ({"part_b": FACE | {"hurst": 2.0}}, "part_b: hurst must be"),
-        ({"part_b": FACE | {"nominal_area": 4}}, "nominal_area is of the joint"),
+        ({"part_b": FACE | {"nominal_area": 4}}, r"of the joint, Joint\(part_a,"),
     ],
     ids=str,
 )
@@ -737,3 +746,16 @@ def test_a_joint_tells_the_ranges_of_its_conductivities(joint):
     # what a user states is no mean of a range
     stated = Bodies(metals=METALS, conductivity="50 W/(m K)")
     assert "conductivities" not in dataclasses.replace(joint, bodies=stated).facts()
+
+
+def test_a_side_that_is_too_short_is_not_said_to_be_long_enough():
+    """It was "4 longest wavelengths a side, fewer than 4"."""
+    face = Surface.from_roughness(**FACE, nominal_area=f"{(0.5 * 3.98) ** 2} mm^2")
+    (reason,) = (
+        reason
+        for reason in contact(
+            face, "100 GPa", pressure="10 MPa", theory="calibrated"
+        ).reasons
+        if "a side" in reason
+    )
+    assert "has 3.98 longest wavelengths a side, fewer than 4" in reason

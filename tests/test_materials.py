@@ -1,3 +1,4 @@
+import dataclasses
 import json
 
 import numpy as np
@@ -320,15 +321,21 @@ def test_metals_that_yield_are_not_valid_without_a_hardness():
     assert at("steel 1020").valid  # one temper: it yields by default
     assert at("steel 1020").yielded > 0.9
     (reason,) = at("steel 4140").reasons
-    assert (
-        reason
-        == "steel 4140 yields here: give hardness= of its temper, '2.06 GPa' to '5.76 GPa'"
+    assert reason == (
+        "steel 4140 yields here: give its temper, 'steel 4140 soft' or 'steel 4140 hard', "
+        "or Bodies(metals=..., hardness=...), '2.06 GPa' to '5.76 GPa'"
     )
+    # the remedies are taken as they are written
+    for temper in ("steel 4140 soft", "steel 4140 hard"):
+        assert at(temper).valid
+    of_ones_own = dataclasses.replace(materials.get("steel 4140"), name="own steel")
+    (reason,) = at(of_ones_own).reasons
+    assert reason.startswith("own steel yields here: give Bodies(metals=..., hardness=")
     assert at(Bodies(metals="steel 4140", hardness="200 HV")).valid
     elastic_pair = Bodies(metals=("steel 52100", "silver"), hardness=np.inf)
     assert not at(elastic_pair).valid
     (reason,) = at(elastic_pair).reasons
-    assert reason == "silver yields here: give hardness='0.26 GPa'"
+    assert reason == "silver yields here: give Bodies(metals=..., hardness='0.26 GPa')"
     # elastic up to gradients of 0.073, docs/yield.md
     polished = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5).scaled(1.0, "um")
     for gradient, elastic in ((0.07, True), (0.08, False)):

@@ -104,22 +104,55 @@ MOVED = {
     ),
 }
 
+# what drawings and instruments have, and functions that take a roughness do not
+PEAK_TO_VALLEY = (
+    "a peak-to-valley height is no rms height, and its ratio to Rq depends on the measured "
+    "length; give Rq or Ra"
+)
+OF_DRAWINGS = {
+    **dict.fromkeys(("Rz", "Rt", "Rp", "Rv", "Rmax", "Sz"), PEAK_TO_VALLEY),
+    **dict.fromkeys(
+        ("lambda_c", "cutoff", "cut_off"),
+        "the cut-off lambda_c is the longest wavelength that Ra contains, longest=",
+    ),
+    "lambda_s": "the filter lambda_s is the shortest wavelength, shortest=",
+}
+OF_ROUGHNESS = dict.fromkeys(
+    ("Rq", "Ra", "Sq", "Sa", "Rdq", "Sdq", "Rsm", "longest", "shortest", *OF_DRAWINGS),
+    "Surface.from_roughness takes roughness parameters (docs/howto/roughness.md)",
+)
+# hints for names that are no arguments, of functions that have one of the first ones
+ELSEWHERE = (
+    ({"bodies", "theory"}, MOVED),
+    ({"Rq"}, OF_DRAWINGS),
+    ({"h_rms"}, OF_ROUGHNESS),
+)
+
+
+def _called(function: Callable[..., Any], arguments: tuple[Any, ...]) -> str:
+    """Name of a function as it was called: of a class method, with the class of the call."""
+    name = function.__qualname__.removesuffix(".__init__")
+    if arguments and isinstance(arguments[0], type):
+        return f"{arguments[0].__name__}.{function.__name__}"
+    return name
+
 
 def hinted(function: Callable[P, R]) -> Callable[P, R]:
     """Decorator: an unknown argument's error names the nearest, or a symbol's meaning."""
     parameters = inspect.signature(function).parameters
     names = [name for name in parameters if name not in ("self", "cls")]
-    called = function.__qualname__.removesuffix(".__init__")
 
     @functools.wraps(function)
     def checked(*arguments: P.args, **named: P.kwargs) -> R:
         for name in named:
             if name in parameters:
                 continue
-            if name in MOVED and {"bodies", "theory"} & {*names}:
-                raise TypeError(f"{called} has no argument {name!r}: {MOVED[name]}")
             meant = SYMBOLS.get(name)
             hint = f"did you mean {meant!r}?" if meant in names else nearest(name, names)
+            for of_functions, hints in ELSEWHERE:
+                if name in hints and of_functions & {*names}:
+                    hint = hints[name]
+            called = _called(function, arguments)
             raise TypeError(f"{called} has no argument {name!r}: {hint}")
         return function(*arguments, **named)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray, any_labelled
 from mbma_tables.common.units import factor
-from mbma_tables.materials import ELASTIC_PSI, HARDEST
+from mbma_tables.materials import ELASTIC_PSI, HARDEST, is_name
 from mbma_tables.quantities.state import State
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import Theory, TheoryAnswer
@@ -106,11 +106,12 @@ def _reasons_of_bodies(
         return {text: is_elastic & (mean_pressure > HARDEST * gigapascal)}
     softer = bodies.pair.softer
     soft, hard = softer.hardness
-    needed = (
-        f"'{soft:g} GPa'"
-        if soft == hard
-        else f" of its temper, '{soft:g} GPa' to '{hard:g} GPa'"
-    )
+    remedy = f"Bodies(metals=..., hardness='{soft:g} GPa')"
+    if soft != hard:
+        remedy = f"Bodies(metals=..., hardness=...), '{soft:g} GPa' to '{hard:g} GPa'"
+        if is_name(f"{softer.name} hard"):
+            tempers = f"'{softer.name} soft' or '{softer.name} hard'"
+            remedy = f"its temper, {tempers}, or {remedy}"
     yields = E_star * np.asarray(surface.rms_gradient) > ELASTIC_PSI * soft * gigapascal
-    text = f"{softer.name} yields here: give hardness={needed}"
+    text = f"{softer.name} yields here: give {remedy}"
     return {text: is_elastic & (yields | (mean_pressure > soft * gigapascal))}

@@ -13,7 +13,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.toml_files import check, read_toml
 from mbma_tables.scenes.plan import Plan, make_plan
 from mbma_tables.scenes.problem import Problem
-from mbma_tables.scenes.specimen import from_tables, schema
+from mbma_tables.scenes.specimen import from_tables, refuse_joint, schema
 
 if TYPE_CHECKING:
     import xarray
@@ -94,6 +94,7 @@ class Scene(Problem):
         """
         file = pathlib.Path(path)
         entries = read_toml(file, "scene")
+        refuse_joint(file, entries)
         try:
             return cls.from_mapping(entries, file.parent, file.stem)
         except InputError as fault:

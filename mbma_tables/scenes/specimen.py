@@ -171,15 +171,20 @@ def effective_modulus_of(
     return float(effective_modulus(**numbers)), unit
 
 
-def read_specimen(path: pathlib.Path) -> Specimen:
-    """The specimen of a TOML file with the tables [surface] and [material] of a scene."""
-    entries = read_toml(path, "surface")
-    tables = {name: schema()["properties"][name] for name in ("surface", "material")}
+def refuse_joint(path: pathlib.Path, entries: Mapping[str, Any]) -> None:
+    """Raise an error for the file of a joint, with the commands that read it."""
     if "bodies" in entries or "part_a" in entries:
         raise InputError(
             f"{path} describes a joint, not one surface: `mbma joint {path} --pressure 1MPa` has its results, and "
             f"`mbma joint {path} --export TARGET --pressures 1MPa:50MPa --out FILE` writes it for other programs"
         )
+
+
+def read_specimen(path: pathlib.Path) -> Specimen:
+    """The specimen of a TOML file with the tables [surface] and [material] of a scene."""
+    entries = read_toml(path, "surface")
+    tables = {name: schema()["properties"][name] for name in ("surface", "material")}
+    refuse_joint(path, entries)
     try:
         check(
             entries,

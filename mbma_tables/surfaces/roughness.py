@@ -86,6 +86,11 @@ TYPICAL = (
     "independent points"
 )
 BAND = "two of longest, shortest and Rdq (or Sdq, Rsm)"
+FILTERS = (
+    "the cut-off lambda_c is longest, the filter lambda_s or the resolution shortest"
+)
+# where each number comes from
+PAGE = "docs/howto/roughness.md, 'From Ra and a filter to a surface', says where to find each"
 
 
 def _one_of(names: tuple[str, ...], numbers: Mapping[str, Any], what: str) -> str:
@@ -200,16 +205,16 @@ def _refuse_missing(
         )
     if len(band) < 2:
         others = " and ".join(band) or "none"
-        missing.append(f"the band of wavelengths, {BAND}; got {others}")
+        missing.append(f"the band of wavelengths, {BAND}, got {others} ({FILTERS})")
     if not top:
         missing.append(
-            f"the highest point, one of {', '.join(TOPS)}, which Rq and Ra do not "
-            f"determine ({TYPICAL})"
+            f"the highest point, one of {', '.join(TOPS)} (the last of a joint beside its "
+            f"parts), which Rq and Ra do not determine ({TYPICAL})"
         )
     if missing:
         raise InputError(
             f"roughness has {', '.join(stated) or 'no numbers'}; "
-            f"missing: {'; '.join(missing)}"
+            f"missing: {'; '.join(missing)}. {PAGE}"
         )
 
 

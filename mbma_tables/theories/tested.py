@@ -6,6 +6,7 @@ They are in the shipped file tested.csv, by theory, and for contacts with a hard
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -179,7 +180,8 @@ def _of_the_side(surface: AnySurface) -> dict[str, Any]:
         return {}
     waves = np.asarray(steps["nominal_area"]["waves_a_side"])
     short = waves < SIDE * (1 - ROUNDING)
-    shortest = f"{float(waves.min()):.2g}"
+    # rounded down, so that the text does not say "4, fewer than 4"
+    shortest = f"{math.floor(100 * float(waves.min())) / 100:g}"
     text = (
         f"the nominal area has {shortest} longest wavelengths a side, fewer than {SIDE:g}: surfaces with so "
         "few summits differ by more than the scatter; contact(Surface.from_map(...), theory='simulated') "

@@ -74,3 +74,11 @@ def test_costs_and_distances_have_a_line_for_each_row():
         assert row["seconds"] == pytest.approx(
             expected.cost * found["unit_seconds"], rel=1e-12, abs=0
         )
+
+
+@pytest.mark.parametrize("command", ["plan", "run"])
+def test_the_file_of_a_joint_is_no_scene_and_names_its_command(command):
+    path = pathlib.Path(JOINT).with_name("joint.toml")
+    assert f"`mbma joint {path} --pressure 1MPa` has its results" in refused(
+        command, str(path)
+    )
