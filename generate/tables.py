@@ -8,13 +8,9 @@ import click
 from generate.files import ROOT
 from mbma_tables.common.errors import InputError
 from mbma_tables.tables.configuration import MIN_SHIPPED_POINTS, Configuration, load
-from mbma_tables.tables.make_island4d import Island4d
-from mbma_tables.tables.make_universal import Universal
-from mbma_tables.tables.schema import ISLAND4D, UNIVERSAL
-from mbma_tables.tables.writer import write_table
+from mbma_tables.tables.make import KINDS, make_table, summary
 
 TABLES = ROOT / "tables"
-KINDS: dict[str, type[Universal | Island4d]] = {UNIVERSAL: Universal, ISLAND4D: Island4d}
 
 
 @click.command()
@@ -59,20 +55,12 @@ def tables(
                 f"certificate_points must be at least {MIN_SHIPPED_POINTS} for a table in {TABLES}, "
                 f"got {own.certificate_points}; give another place with --out"
             )
-        if path.is_dir():
-            raise InputError(f"--out must name a file for one table, {path} is a folder")
         chosen[path] = own
     if what in ("all", "heights"):
         from generate import height_coefficients
 
         height_coefficients.main()
     for path, configuration in chosen.items():
-        content = KINDS[configuration.kind](configuration, workers).build()
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_table(path, content)
-        errors = ", ".join(
-            f"{f} {content.attributes[f'largest_error_{f}']:.2e}" for f in ("F", "A")
-        )
-        click.echo(
-            f"{path}: {content.size}; largest held-out error {errors}; {path.stat().st_size} bytes"
-        )
+        if what == "all":
+            path.parent.mkdir(parents=True, exist_ok=True)
+        click.echo(summary(path, make_table(configuration, path, workers)))

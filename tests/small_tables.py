@@ -8,9 +8,9 @@ import tempfile
 import netCDF4
 import numpy as np
 
-from generate.tables import KINDS
 from mbma_tables.common.netcdf import SEAL, SEAL_LENGTH
 from mbma_tables.tables.configuration import load
+from mbma_tables.tables.make import KINDS
 
 SMALL = {
     "universal": """

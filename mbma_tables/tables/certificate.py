@@ -1,7 +1,8 @@
 """What both tables share: exact islands, solved in chunks, held-out errors, points to replay, physical rules."""
 
+import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.stats import qmc
@@ -18,6 +19,15 @@ CONFORMANCE_TOLERANCE = 1e-11
 SOLVER_SHARE = 0.01
 MAX_DRAWS = 400  # islands drawn for each that a narrow table covers
 CHUNK = 2000
+
+
+class Forecast(NamedTuple):
+    """What a table would take on this machine, estimated."""
+
+    points: int  # nodes of the table, or coefficients
+    islands: int  # to be solved
+    seconds: float
+    bytes: int
 
 
 class UncertifiedError(MbmaError):
@@ -101,7 +111,8 @@ class Kind:
         half = self.configuration.certificate_points // 2
         if errors.max() > own.target:
             raise UncertifiedError(
-                f"{own.kind}: the largest held-out error is {errors.max():.2e}, the target {own.target:.2e}"
+                f"{own.kind}: the largest held-out error is {errors.max():.2e}, the target {own.target:.2e}: "
+                f"ask for a lower target, for which more nodes are taken, or give the axes more nodes"
             )
         result: dict[str, Any] = {"certificate_points": own.certificate_points}
         for function, values in zip(FUNCTIONS, errors.T, strict=True):
@@ -118,6 +129,21 @@ class Kind:
                 ),
             }
         return result
+
+    def build(self) -> TableContent:
+        """The table, certified."""
+        raise NotImplementedError
+
+    def forecast(self) -> Forecast:
+        """What `build` would take."""
+        raise NotImplementedError
+
+    def seconds_of(self, X: FloatArray, mu: FloatArray, refinement: int = 1) -> float:
+        """Measured seconds of one exact island of these, flat arrays."""
+        phi(X[:1], mu[:1], self.rtol)
+        start = time.perf_counter()
+        phi(X, mu, self.rtol, refinement)
+        return (time.perf_counter() - start) / X.size
 
     def require(self, rules: dict[str, Any]) -> None:
         """Raise UncertifiedError that names the first of these rules that is not kept."""

@@ -25,6 +25,7 @@ RANGE = {
     "nodes": 2,
 }  # of an axis; the universal table has cells, no nodes
 MIN_NODES = 8  # of an axis
+NEAREST = 1.001  # between two targets that are not told apart
 MIN_SHIPPED_POINTS = 5000  # of the certificate of a table in the shipped folder
 
 
@@ -57,6 +58,68 @@ class Configuration:
         }
 
 
+def _require_finite(entries: dict[str, Any], place: str = "") -> None:
+    """Raise InputError for the first number that is infinite or NaN, with its key."""
+    for name, value in entries.items():
+        if isinstance(value, dict):
+            _require_finite(value, f"{place}{name}.")
+        elif isinstance(value, float) and not math.isfinite(value):
+            raise InputError(f"{place}{name} must be a finite number, got {value}")
+
+
+def _axes(given: dict[str, Any], own: dict[str, Any], target: float) -> dict[str, Axis]:
+    """The axes of a shipped configuration `given`, changed by `own`, for a target."""
+    kind = given["kind"]
+    finer = (given["target"] / target) ** (1 / (DEGREE + 1))
+    axes = dict[str, Axis]()
+    for name, entry in given["axes"].items():
+        chosen: dict[str, Any] = RANGE | entry
+        if kind == ISLAND4D:
+            chosen["nodes"] = max(MIN_NODES, math.ceil(finer * entry["nodes"]))
+        chosen |= own.get("axes", {}).get(name, {})
+        axes[name] = Axis(name, TEXTS["axes"][name], dict(AXES[kind])[name], **chosen)  # type: ignore[arg-type]
+    return axes
+
+
+def nodes_of(axes: dict[str, Axis]) -> int:
+    """Nodes of a table with these axes."""
+    return math.prod(axis.nodes for axis in axes.values())
+
+
+def _nearest(
+    given: dict[str, Any], own: dict[str, Any], wanted: Configuration, most: int
+) -> str:
+    """The least target that takes at most so many nodes, in words."""
+    low = wanted.target
+    high = SCHEMAS[wanted.kind]["properties"]["target"]["maximum"]
+    if nodes_of(_axes(given, own, high)) > most:
+        return "give the axes fewer nodes, which the file counts"
+    while high / low > NEAREST:
+        middle = math.sqrt(low * high)
+        if nodes_of(_axes(given, own, middle)) > most:
+            low = middle
+        else:
+            high = middle
+    unit = 10.0 ** (math.floor(math.log10(high)) - 1)
+    return f"the nearest on these axes is a target of {math.ceil(high / unit) * unit:.1e}"
+
+
+def _too_many(given: dict[str, Any], own: dict[str, Any], wanted: Configuration) -> str:
+    """What a configuration with too many nodes would take, and the nearest target within reach."""
+    count = nodes_of(wanted.axes)
+    most = SCHEMAS[wanted.kind]["properties"]["max_nodes"]["maximum"]
+    takes = f"a target of {wanted.target:.1e} on these axes takes {count} nodes"
+    if count <= most:
+        return (
+            f"{takes}, and max_nodes is {wanted.max_nodes}: set max_nodes = {count}; with "
+            f"{wanted.max_nodes}, {_nearest(given, own, wanted, wanted.max_nodes)}"
+        )
+    return (
+        f"{takes}, and a table has at most {most}: with max_nodes = {most}, {_nearest(given, own, wanted, most)}; a "
+        "table of kind universal reaches 1e-11"
+    )
+
+
 def load(
     kind: str, path: pathlib.Path | None = None, target: float | None = None
 ) -> Configuration:
@@ -69,27 +132,14 @@ def load(
     own = {} if path is None else read_toml(path, "configuration")
     own |= {} if target is None else {"target": target}
     try:
-        json.dumps(own, allow_nan=False, default=str)
+        _require_finite(own)
         check(own, SCHEMAS[kind])
         merged = given | own
-        axes = dict[str, Axis]()
-        finer = (given["target"] / merged["target"]) ** (1 / (DEGREE + 1))
-        for name, entry in given["axes"].items():
-            nodes = (
-                {"nodes": max(MIN_NODES, math.ceil(finer * entry["nodes"]))}
-                if kind == ISLAND4D
-                else {}
-            )
-            chosen: dict[str, Any] = (
-                RANGE | entry | nodes | own.get("axes", {}).get(name, {})
-            )
-            axes[name] = Axis(name, TEXTS["axes"][name], dict(AXES[kind])[name], **chosen)  # type: ignore[arg-type]
+        axes = _axes(given, own, merged["target"])
         found = Configuration(**merged | {"axes": axes})
-        count = math.prod(axis.nodes for axis in axes.values())
+        count = nodes_of(axes)
         if count > found.max_nodes:
-            raise InputError(
-                f"the axes have {count} nodes, max_nodes allows {found.max_nodes}; raise it or the target"
-            )
+            raise InputError(_too_many(given, own, found))
         for name, axis in axes.items():
             with np.errstate(all="ignore"):
                 if not (np.diff(axis.values) > 0).all():

@@ -27,6 +27,7 @@ from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.surfaces.spectrum import BROADENING
 from mbma_tables.tables.certificate import (
     CONFORMANCE_POINTS,
+    Forecast,
     Kind,
     UncertifiedError,
     conformance,
@@ -53,6 +54,10 @@ VISITED = {
     "log10_approach": (-8.0, 1.0),
 }
 COVER_TRIALS = 4096
+# islands that are solved for a forecast; bytes of a file, and of one of its nodes
+SAMPLED = 256
+FILE_BYTES = 1e5
+BYTES_PER_NODE = 32
 BLAS_THREADS = 2  # as when the shipped table was made
 LOCAL_FLOOR = 0.8  # smallest bound, in units of the islands' tolerance
 LOCAL_FACTOR = 1.5  # bound over the sum of the largest errors along the edges of a cell
@@ -131,6 +136,28 @@ class Island4d(Kind):
             attributes=self.attributes() | certified | own.attributes(),
         )
         return self.checked(content)
+
+    def forecast(self) -> Forecast:
+        """What `build` would take: islands at nodes, at places on edges, and held-out ones."""
+        own = self.configuration
+        axes = tuple(own.axes.values())
+        nodes = math.prod(axis.nodes for axis in axes)
+        solved = nodes * (1 + len(EDGE_PLACES) * len(axes))
+        box = qmc.Halton(len(axes), seed=own.seed).random(SAMPLED)
+        X, mu = self.arguments(
+            *(
+                axis.coordinate(place * (axis.nodes - 1))
+                for axis, place in zip(axes, box.T, strict=True)
+            )
+        )
+        seconds = solved * self.seconds_of(X, mu) / self.workers
+        seconds += own.certificate_points * self.seconds_of(X, mu, 2) / self.workers
+        return Forecast(
+            nodes,
+            solved + own.certificate_points,
+            seconds,
+            round(FILE_BYTES + BYTES_PER_NODE * nodes),
+        )
 
     def held_out(self, axes: tuple[Axis, ...], count: int, seed: int) -> list[FloatArray]:
         """Coordinates of certificate points: half over the whole box, half where surfaces really go."""

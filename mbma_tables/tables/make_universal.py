@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import time
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.variants import VARIANTS
 from mbma_tables.tables.certificate import (
     CONFORMANCE_POINTS,
+    Forecast,
     Kind,
     UncertifiedError,
     conformance,
@@ -36,6 +38,10 @@ VISITED = {
     "log10_approach": (-7.0, 1.0),
 }
 
+# ranges of X that are made for a forecast; bytes of a file, and of one of its cells
+SAMPLED = 6
+FILE_BYTES = 5e4
+BYTES_PER_CELL = 380
 AIM = 0.5  # of the target, for the tests of a cell
 AIM_IN_X = 0.4  # of that, for a line along X
 LOCAL_FACTOR = 1.5  # bound over the largest error at the tests of a cell
@@ -230,6 +236,26 @@ class Universal(Kind):
         attributes = known | self.certify(content)
         return self.checked(
             dataclasses.replace(content, conformance=points, attributes=attributes)
+        )
+
+    def forecast(self) -> Forecast:
+        """What `build` would take, from the cells of a few of its ranges of X."""
+        start = time.perf_counter()
+        strips = self.strips()
+        before = time.perf_counter()
+        chosen = strips[:: math.ceil(len(strips) / SAMPLED)]
+        cells = [len(cells_of(*dataclasses.astuple(strip))) for strip in chosen]
+        share = len(strips) / len(chosen)
+        count = round(share * sum(cells))
+        now = time.perf_counter()
+        points = self.configuration.certificate_points
+        place = np.full(100, 5.0), np.logspace(-3, 3, 100)
+        seconds = points * self.seconds_of(*place, 2) + share * (now - before)
+        return Forecast(
+            count * TERMS**2,
+            count * (TERMS**2 + TESTS.size**2) + points,
+            before - start + seconds / self.workers,
+            round(FILE_BYTES + BYTES_PER_CELL * count),
         )
 
     def held_out(self, content: TableContent, count: int, seed: int) -> list[FloatArray]:
