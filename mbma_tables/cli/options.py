@@ -417,6 +417,17 @@ def _named_values(texts: Sequence[str]) -> dict[str, Any]:
     return values
 
 
+class _IslandModel(click.Choice[str]):
+    """The name of an island model, or the file of a table."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Any:
+        if isinstance(value, str) and (value.endswith(".nc") or Path(value).is_file()):
+            return value
+        return super().convert(value, param, ctx)
+
+
 SHOWN: dict[str, Any] = {"show_default": True}
 variant_option = _option(
     "variant",
@@ -429,9 +440,9 @@ _MODEL_OPTIONS = (
     variant_option,
     _option(
         "island_model",
-        "Island model.",
+        "Island model, by name or as the FILE.nc of a table.",
         default="universal",
-        type=click.Choice(ISLAND_MODELS),
+        type=_IslandModel(ISLAND_MODELS),
         **SHOWN,
     ),
     _option(

@@ -23,6 +23,8 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.islands.island_models import AnyModel
 from mbma_tables.scenes.problem import INVERTED, OF_CONTACT, OUTPUTS, REFINEMENTS, Problem
+from mbma_tables.tables.island4d import Island4dModel
+from mbma_tables.tables.universal import UniversalModel
 
 TABLES = ("universal", "island4d")  # island models that are tables
 ISLAND_SHARE = 0.5  # share of a step's tolerance; the rest is for its quadrature
@@ -283,7 +285,9 @@ def certified_error(island_model: str | AnyModel, rtol: float) -> float:
     if island_model == "universal":
         from mbma_tables.tables.open import open_table
 
-        certificate = open_table(island_model).content.attributes
+        island_model = open_table(island_model)
+    if isinstance(island_model, UniversalModel | Island4dModel):
+        certificate = island_model.content.attributes
         return max(
             float(certificate["largest_error_F"]), float(certificate["largest_error_A"])
         )
@@ -521,5 +525,11 @@ class _Planner:
 
 
 def _name(island_model: Any) -> str:
-    """The name of an island model in the table of measured costs, which holds the shipped ones."""
+    """The name of an island model in the table of measured costs.
+
+    A table of a user's own costs what the shipped one of its kind does: the lookup does not
+    depend on the number of nodes.
+    """
+    if isinstance(island_model, UniversalModel | Island4dModel):
+        return island_model.name
     return island_model if isinstance(island_model, str) else ""

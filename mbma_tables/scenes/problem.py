@@ -22,8 +22,11 @@ from mbma_tables.islands.island_models import ISLAND_MODELS, AnyModel
 from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.materials import hardness_in
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.tables.island4d import Island4dModel
+from mbma_tables.tables.universal import UniversalModel
 from mbma_tables.theories import OF_MAPS, THEORIES, default_name, resolve
 from mbma_tables.theories.base import Theory
+from mbma_tables.theories.mbma.models import with_table
 
 # effects, described in docs/scenes.md: those that are read from one contact, and others
 OF_CONTACT = (
@@ -98,6 +101,8 @@ class Problem:
                 "a scene has one surface, not a batch: make a scene for each"
             )
         self._set_numbers()
+        if self.island_model is not None:
+            vars(self).update(island_model=with_table(self.island_model))
         if self.theory is None:
             vars(self).update(theory=self._default_theory())
         self._take_options_of_theory()
@@ -262,7 +267,8 @@ class Problem:
         if self.island_model is not None and "sphere_deformation" in self.dropped:
             rigid = "sphere_deformation is off, which is the rigid sphere"
             raise InputError(f"{rigid}: leave island model out")
-        if self.seconds is not None and not isinstance(self.island_model, str | None):
+        is_measured = isinstance(self.island_model, str | UniversalModel | Island4dModel)
+        if self.seconds is not None and self.island_model is not None and not is_measured:
             unmeasured = "the cost of your own island model is not known"
             raise InputError(f"{unmeasured}: give rtol instead of seconds")
         if isinstance(self.theory, str):

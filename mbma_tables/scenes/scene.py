@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from mbma_tables.common.arguments import needed
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.toml_files import check, read_toml
+from mbma_tables.islands.island_models import ISLAND_MODELS
 from mbma_tables.scenes.plan import Plan, make_plan
 from mbma_tables.scenes.problem import Problem
 from mbma_tables.scenes.specimen import from_tables, refuse_joint, schema
@@ -49,8 +50,8 @@ class Scene(Problem):
         Time budget instead of `rtol`; the measured costs determine the accuracy that it allows.
     variant : str or Variant
         Variant of the paper's equations.
-    island_model : str or IslandModel, optional
-        Island model, as for `contact`; without it the plan chooses between "universal" and "exact".
+    island_model : str, path or IslandModel, optional
+        Island model, as for `Mbma`; without it the plan chooses between "universal" and "exact".
     theory : str or theory, optional
         One of `mbma_tables.theories.THEORIES` or an object, as for `contact`. Refinements,
         island model and variant are MBMA's.
@@ -126,9 +127,11 @@ class Scene(Problem):
         }
         found |= {
             name: content[name]
-            for name in ("title", "theory", "variant")
+            for name in ("title", "theory", "variant", "island_model")
             if name in content
         }
+        if found.get("island_model", "exact") not in ISLAND_MODELS:
+            found["island_model"] = folder / found["island_model"]
         for name in (
             "prescribed",
             "pressure_profile",

@@ -29,7 +29,7 @@ from mbma_tables.islands.island_models import (
 from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
-from mbma_tables.theories.mbma.models import get_model
+from mbma_tables.theories.mbma.models import get_model, with_table
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -125,7 +125,7 @@ def island(
         raise InputError("island takes plain arrays: use .values of the DataArrays")
     approach = positive_array("delta", delta)
     modulus = positive_array("E_star", E_star)
-    model = get_model(island_model, rtol, rule)
+    model = get_model(with_table(island_model), rtol, rule)
     require("delta", approach, approach >= SMALLEST_DELTA, f"at least {SMALLEST_DELTA:g}")
     broadcast_shape(delta=approach, surface=surface.h_rms, E_star=modulus)
     shape = broadcast_shape(delta=approach, surface=surface.h_rms)

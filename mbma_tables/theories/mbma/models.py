@@ -1,11 +1,46 @@
 """Island models by name, by a table's file, or as objects."""
 
+import functools
+import os
+import pathlib
+
 from mbma_tables.common.arguments import number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.islands import island_models as models
 from mbma_tables.islands.island_models import AnyModel
 from mbma_tables.islands.variants import Variant
 from mbma_tables.tables.open import open_table
+
+
+@functools.lru_cache(maxsize=8)
+def _read(path: pathlib.Path, state: tuple[int, int] | None) -> AnyModel:
+    """The table of a file in a state, read once, so that theories of one file are equal."""
+    return open_table(path)
+
+
+def _of_file(path: pathlib.Path) -> AnyModel:
+    """The table of a file as it is now."""
+    try:
+        stat = path.stat()
+    except OSError:
+        return open_table(path)
+    return _read(path.resolve(), (stat.st_mtime_ns, stat.st_size))
+
+
+def with_table(island_model: str | os.PathLike[str] | AnyModel) -> str | AnyModel:
+    """The model of a table's file; a name or an object is returned as it is.
+
+    Raises
+    ------
+    TableFileError
+        If the file is not there, damaged, or no table.
+    """
+    if isinstance(island_model, os.PathLike):
+        return _of_file(pathlib.Path(island_model))
+    if not isinstance(island_model, str) or island_model in models.ISLAND_MODELS:
+        return island_model
+    path = pathlib.Path(island_model)
+    return _of_file(path) if path.suffix == ".nc" or path.is_file() else island_model
 
 
 def get_model(island_model: str | AnyModel, rtol: float, variant: Variant) -> AnyModel:
@@ -27,9 +62,7 @@ def get_model(island_model: str | AnyModel, rtol: float, variant: Variant) -> An
         isinstance(model, models.IslandModel | models.GeometryModel)
         and isinstance(getattr(model, "name", None), str)
     ):
-        known = (
-            f"one of {models.ISLAND_MODELS} or an object with a name and answer(X, mu)"
-        )
+        known = f"one of {models.ISLAND_MODELS}, the file of a table, or an object with a name and answer(X, mu)"
         raise InputError(f"island_model must be {known}, got {island_model!r}")
     made_for = getattr(model, "variant", variant)
     if isinstance(made_for, Variant) and (

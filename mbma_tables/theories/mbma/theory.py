@@ -13,6 +13,7 @@ from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.shared import shared_property
 from mbma_tables.islands.geometry import kinks
 from mbma_tables.islands.island_models import (
+    ISLAND_MODELS,
     MIN_RTOL,
     AnyModel,
     check_outside,
@@ -32,7 +33,7 @@ from mbma_tables.theories.base import (
 )
 from mbma_tables.theories.inversion import Curve
 from mbma_tables.theories.mbma.island import check_band
-from mbma_tables.theories.mbma.models import get_model
+from mbma_tables.theories.mbma.models import get_model, with_table
 from mbma_tables.theories.mbma.profile import profile
 from mbma_tables.theories.mbma.sums import QUADRATURE_SHARE, Sums, Totals, totals_at
 
@@ -51,8 +52,8 @@ class Mbma(Theory):
     ----------
     island_model : str or island model
         How islands are evaluated: "universal" or "island4d", the shipped tables; "exact",
-        the solver; "formula" or "rigid", closed forms; or an object, such as that of
-        `mbma_tables.open_table`.
+        the solver; "formula" or "rigid", closed forms; the path of a table's file, which is
+        read once; or an object, such as that of `mbma_tables.open_table`.
     variant : str or Variant
         Interpretation of the paper: "reported", "printed" or "fitted", or a `Variant`.
     rtol : float
@@ -85,6 +86,8 @@ class Mbma(Theory):
     def __post_init__(self) -> None:
         check_outside(self.outside)
         object.__setattr__(self, "variant", get_variant(self.variant))
+        if self.island_model not in ISLAND_MODELS:
+            object.__setattr__(self, "island_model", with_table(self.island_model))
 
     @property
     def variant_name(self) -> str:
