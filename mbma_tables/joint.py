@@ -493,8 +493,9 @@ class Joint(JointQuantities, Displayed):
             File to write, and beside it those that belong to it, by the end that the target
             gives them.
         quantity : str or sequence of str, optional
-            Of the rows, as for `mbma export --quantity`; several for targets "lsdyna",
-            "getdp" and "moose-function". Default: conductance, with the pressure in solvers
+            Of the rows, as for `describe_law`: data, and programs that interpolate any
+            table, take every quantity of a contact. Several for targets "lsdyna", "getdp"
+            and "moose-function". Default: conductance, with the pressure in solvers
             that have both; without `heat` pressure.
         rows, rtol : int and float, optional
             Number of rows, or their largest error of linear interpolation; by default as
@@ -592,6 +593,8 @@ class Joint(JointQuantities, Displayed):
             kappa_varies=not isotropic,
             friction=self.friction,
             gas=gas,
+            bodies=self.bodies,
+            interface=self.interface,
         )
 
     def _kappa(self, area: Any) -> Any:

@@ -28,7 +28,6 @@ DRAWN = (
     "calibrated",
     "persson",
 )  # theories shown beside the chosen one in a picture, where available
-COLUMNS = ("mean_separation", "separation", "pressure", "area", "error")
 MEASURED = ("h_rms", "h_max", "rms_gradient", "skewness", "kurtosis", "anisotropy")
 ISLAND_FIELDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
 
@@ -38,16 +37,15 @@ ISLAND_FIELDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "
 )
 @options.load_options(options.numbers_option)
 @options.leakage_option
-@options.numbers_option(
-    "--conductivity",
-    help="Of both bodies, or of each: adds conductance. In W/(m^2 K) of '45 W/(m K)'.",
-)
+@options.columns_option
+@options.conductivity_option
 @options.specimen_options
 @options.theory_options
 @options.output_options
 def contact_command(
     loads: dict[str, list[float | str]],
     leakage: bool,
+    quantity: list[str] | None,
     conductivity: list[float | str] | None,
     specimen: Specimen,
     model: options.Model,
@@ -69,15 +67,13 @@ def contact_command(
     from mbma_tables.contacts.contact import contact
 
     load = {name: finite_array(name, specimen.units.number(name, numbers))}
-    if conductivity and len(conductivity) == 1:
-        conductivity = 2 * conductivity
     pressed = contact(
         specimen.surface,
         model.bodies(specimen, conductivity),
         theory=model.theory,
         **load,
     )
-    values, units = columns_of(pressed)
+    values, units = columns_of(pressed, asked=quantity or ())
     if leakage:
         flow, units_of_flow = _leakage(pressed)
         values |= flow
@@ -107,6 +103,8 @@ def _leakage(answer: Contact) -> tuple[dict[str, Any], dict[str, str]]:
     help="How many gaps.",
 )
 @options.leakage_option
+@options.columns_option
+@options.conductivity_option
 @options.plot_option
 @options.specimen_options
 @options.theory_options
@@ -114,12 +112,14 @@ def _leakage(answer: Contact) -> tuple[dict[str, Any], dict[str, str]]:
 def curve_command(
     points: int,
     leakage: bool,
+    quantity: list[str] | None,
+    conductivity: list[float | str] | None,
     plot: Path | None,
     specimen: Specimen,
     model: options.Model,
     output: options.Output,
 ) -> None:
-    """Pressure and area against the mean separation, from first contact (u = h_max) to full compression (u = 0).
+    """Quantities of contact against the mean separation, from first contact (u = h_max) to full compression (u = 0).
 
     Contact areas are geometric, from 0.01% to the largest, between first contact and full
     compression. Gaps where a theory has no finite force are omitted.
@@ -136,7 +136,7 @@ def curve_command(
 
     model = model.of(specimen.surface)
     surface = specimen.surface
-    bodies = model.bodies(specimen)
+    bodies = model.bodies(specimen, conductivity)
     theory = model.theory
     modulus = 1.0 if specimen.E_star is None else specimen.E_star
     gap = float(surface.h_max) * SEARCHED
@@ -149,11 +149,11 @@ def curve_command(
     inner = np.interp(np.log(wanted[:-1]), np.log(area[rising]), gap[rising])
     gap = np.concatenate([[surface.h_max], inner, gap[-1:]])
     answer = contact(surface, bodies, separation=gap, theory=theory)
-    values = {name: getattr(answer, name) for name in COLUMNS}
-    units: dict[str, str] = {}
+    values, units = columns_of(answer, asked=quantity or ())
     if leakage:
-        flow_values, units = _leakage(answer)
-        values |= flow_values
+        flow, units_of_flow = _leakage(answer)
+        values |= flow
+        units |= units_of_flow
     picture = b""
     if plot is not None:
         title = specimen.title + (f", hardness {model.hardness}" if model.yields else "")
@@ -164,9 +164,9 @@ def curve_command(
             *(other_theory(name, surface, gap, modulus, cap) for name in others),
         ]
         labels = plots.pressure_label(unit_of("pressure", specimen.units))
-        flow = plots.leakage_label(unit_of("flow_coefficient", specimen.units))
+        of_flow = plots.leakage_label(unit_of("flow_coefficient", specimen.units))
         picture = plots.to_picture(
-            plots.draw_compression(curves, title, labels, leakage_label=flow),
+            plots.draw_compression(curves, title, labels, leakage_label=of_flow),
             plot.suffix[1:],
         )
     report = report_answer("curve", specimen, model, answer, values, units)

@@ -15,7 +15,13 @@ from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import MAX_BYTES, read_file, write_file
 from mbma_tables.common.progress import echo
-from mbma_tables.export.targets import AGAINST, OPTIONS, Target, targets, write_files
+from mbma_tables.export.targets import (
+    OPTIONS,
+    Target,
+    require_quantity,
+    targets,
+    write_files,
+)
 from mbma_tables.export.text import written_by
 from mbma_tables.materials import tangential_ratio
 from mbma_tables.scenes.specimen import Specimen
@@ -199,7 +205,7 @@ def _rows(target: Target, asked: dict[str, Any]) -> LawTable | list[LawTable]:
     leakage = asked.pop("leakage", False)
     names = asked.pop("quantity", ["leakage" if leakage else heat])
     for name in names:
-        require_name("quantity of rows", name, AGAINST)
+        require_quantity(name)
     if len(names) > 1 and not target.several:
         raise InputError(f"{target.name} has one quantity a file: give one of {names}")
     laws = []

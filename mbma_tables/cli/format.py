@@ -7,7 +7,7 @@ import dataclasses
 import functools
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,8 @@ from mbma_tables.common.progress import echo
 from mbma_tables.common.units import Units
 from mbma_tables.export.text import comment
 from mbma_tables.materials import ELASTIC_PSI
-from mbma_tables.quantities.registry import registry, unit_of
+from mbma_tables.quantities import registry
+from mbma_tables.quantities.registry import unit_of
 from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.surface import assumptions
 
@@ -166,22 +167,25 @@ def shown_unit(name: str, units: Units) -> str:
 
 
 def columns_of(
-    pressed: Contact, uncertainties: bool = False
+    pressed: Contact, uncertainties: bool = False, asked: Sequence[str] = ()
 ) -> tuple[dict[str, Any], dict[str, str]]:
-    """Values and units of the quantities that tables show of a contact, if asked with their uncertainties."""
+    """Values and units of the quantities that tables show of a contact, of those asked for, and of uncertainties if asked."""
     shown_names = [
         name
-        for name, quantity in registry().items()
+        for name, quantity in registry.registry().items()
         if quantity.is_column and quantity.is_shown(pressed)
     ]
+    shown_names += [name for name in dict.fromkeys(asked) if name not in shown_names]
     if uncertainties:
-        stated = {registry()[name].uncertainty for name in shown_names}
-        shown_names += [name for name in registry() if name in stated - {*shown_names}]
+        stated = {registry.registry()[name].uncertainty for name in shown_names}
+        shown_names += [
+            name for name in registry.registry() if name in stated - {*shown_names}
+        ]
     values = {}
     units = {}
     for name in shown_names:
         values[name] = pressed.quantity(name)
-        units[name] = column_unit(registry()[name].unit(pressed))
+        units[name] = column_unit(registry.get(name).unit(pressed))
     values["valid"] = np.where(pressed.valid, "yes", "no")
     units["error"] = "relative"
     return values, units
@@ -252,7 +256,7 @@ def _scatter(answer: Contact) -> tuple[list[str], dict[str, Any]]:
     scatter = {
         name: answer.quantity(name)
         for name in SCATTER
-        if registry()[name].is_available(answer)
+        if registry.registry()[name].is_available(answer)
     }
     # of an elastic contact both stiffnesses are one
     listed_names = [

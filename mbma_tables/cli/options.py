@@ -80,6 +80,8 @@ class Model(NamedTuple):
         """The bodies in contact, of the specimen's modulus."""
         # an absent conductivity is not one of zero entries
         conductivities = tuple(conductivity) if conductivity else None
+        if conductivities is not None and len(conductivities) == 1:
+            conductivities = 2 * conductivities
         return Bodies(
             specimen.modulus, hardness=self.hardness, conductivity=conductivities
         )
@@ -336,7 +338,7 @@ file_options = option_group(
         "--quantity",
         metavar="NAME[,NAME]",
         callback=_names,
-        help="Of the rows, else the usual one; several for lsdyna, getdp, moose-function.",
+        help="Of the rows, any that contacts have, else the usual one; several for lsdyna, getdp, moose-function.",
     ),
     click.option("--rows", type=int, help="Number of rows; else as few as --rtol needs."),
     click.option(
@@ -506,6 +508,16 @@ output_options = option_group(
 )
 leakage_option = _option(
     "leakage", "Add the flow coefficient of the gaps [length^3].", is_flag=True
+)
+columns_option = click.option(
+    "--quantity",
+    metavar="NAME[,NAME]",
+    callback=_names,
+    help="Add columns of further quantities: mean_pressure, hydraulic_aperture, ...",
+)
+conductivity_option = numbers_option(
+    "--conductivity",
+    help="Of both bodies, or of each: adds conductance. In W/(m^2 K) of '45 W/(m K)'.",
 )
 plot_option = _option(
     "plot", "Draw a picture: FILE.png, .svg or .pdf.", type=PATH, metavar="FILE"

@@ -24,7 +24,7 @@ from mbma_tables.law.make import law_of
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.quantities.conductances import conductance_of_gas
 from mbma_tables.quantities.gas import VACUUM
-from mbma_tables.quantities.interface import Gas
+from mbma_tables.quantities.interface import NOTHING_BETWEEN, Gas, Interface
 from mbma_tables.rough_body.force_law import ForceLaw
 from mbma_tables.rough_body.rough_contact import pressed
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -386,7 +386,7 @@ class ExportedLaw:
 
 def exported_law(
     surface: AnySurface | ForceLaw,
-    E_star: float | str = 1.0,
+    E_star: float | str | Bodies = 1.0,
     length_unit: str | None = None,
     stress_unit: str | None = None,
     variant: str | Variant = "reported",
@@ -394,8 +394,9 @@ def exported_law(
     hardness: float | str = np.inf,
     made_by: tuple[str, ...] = (),
     direction: str | float | None = None,
+    interface: Interface = NOTHING_BETWEEN,
 ) -> ExportedLaw:
-    """The law of one surface in known units; a batch of surfaces and missing units are refused."""
+    """The law of one surface in known units, of a modulus and a hardness or of `Bodies`; a batch of surfaces and missing units are refused."""
     if isinstance(surface, ForceLaw):
         if (
             E_star != 1.0
@@ -414,14 +415,15 @@ def exported_law(
             body.surface, surface.law, body.theory, *numbers, force=surface
         )
     one: AnySurface = in_unit(surface, length_unit)
-    bodies = Bodies(E_star, hardness=hardness).in_units(one, stress_unit)
+    given = E_star if isinstance(E_star, Bodies) else Bodies(E_star, hardness=hardness)
+    bodies = given.in_units(one, stress_unit)
     length, stress = _known(bodies.units.length, bodies.units.stress)
     if one.shape != ():
         raise InputError("a contact law is of one surface, not of a batch")
     number_in("E_star", bodies.E_star, 1e-300, 1e300)
     options = {} if variant == "reported" else {"variant": variant}
     chosen = resolve(theory, one, options=options)
-    law = law_of(one, bodies, chosen, LAW_RTOL)
+    law = law_of(one, bodies, chosen, LAW_RTOL, interface)
     return ExportedLaw(
         one, law, chosen, law.E_star, law.hardness, length, stress, made_by, direction
     )

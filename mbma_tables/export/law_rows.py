@@ -23,11 +23,13 @@ from mbma_tables.export.law_table import (
     chosen_rows,
     rounded,
 )
-from mbma_tables.export.targets import AGAINST
+from mbma_tables.export.targets import AGAINST, require_quantity
 from mbma_tables.export.text import about, number
 from mbma_tables.islands.variants import Variant
 from mbma_tables.law.law import ROUNDING
+from mbma_tables.quantities import registry
 from mbma_tables.quantities.effective_medium import LARGEST_AREA
+from mbma_tables.quantities.interface import NOTHING_BETWEEN, Interface
 from mbma_tables.rough_body.force_law import ForceLaw
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import Theory, UserTheory
@@ -53,7 +55,7 @@ FILM_NAMES = ("phi_x", "phi_y", "shear_x", "shear_y", "pressure")
 @hinted
 def describe_law(
     surface: AnySurface | ForceLaw,
-    E_star: float | str = 1.0,
+    E_star: float | str | Bodies = 1.0,
     *,
     length_unit: str | None = None,
     stress_unit: str | None = None,
@@ -75,6 +77,7 @@ def describe_law(
     direction: str | float | None = None,
     gas: GasInGaps | None = None,
     most_rows: int | None = None,
+    interface: Interface = NOTHING_BETWEEN,
 ) -> LawTable:
     """A contact law as rows for a code that interpolates linearly.
 
@@ -85,18 +88,19 @@ def describe_law(
         alone, of pressure as force.
     E_star, variant, theory, hardness
         As for `contact`; with a hardness the law of loading, and conductance by the
-        stiffness of the frozen contact.
+        stiffness of the frozen contact. `Bodies` in place of a modulus have the hardness.
     length_unit, stress_unit : str, optional
         Units of the rows. A surface or modulus that has another one is converted; one that
         has none is in these.
-    quantity : {"pressure", "conductance", "tangential_stiffness", "leakage",
-    "hydraulic_aperture", "film"}
+    quantity : {"pressure", "conductance", "tangential_stiffness", "leakage", "hydraulic_aperture", "film"} or name
         Pressure against overclosure, or against pressure conductance, tangential stiffness
         before slip, the flow coefficient k h_rms^3 of the gaps (`ContactLaw.leakage`), or
         the hydraulic aperture k^(1/3) h_rms with the aperture u, the derivative by u and
         the stiffness -dp/du. A film: flow factors (`flow_factors`), asperity pressure and
         contact area against the mean gap u, from 0.2 h_rms or the largest of `pressures` to
-        10 h_rms, of theory "calibrated" by default.
+        10 h_rms, of theory "calibrated" by default. Any other quantity of a contact is
+        against pressure, as far as it is known and not negative, with what it needs in
+        `Bodies`, `conductivity` and `interface`.
     rows : int, optional
         How many; else as few as `rtol` needs, 1e-3 where neither is given; 200 of a film,
         which has no `rtol`.
@@ -131,6 +135,8 @@ def describe_law(
     most_rows : int, optional
         Rows that the program keeps, taken where neither `rows` nor `rtol` is given and
         fewer miss the usual error.
+    interface : Interface, optional
+        What is between the bodies, for quantities other than those named.
 
     Raises
     ------
@@ -145,15 +151,21 @@ def describe_law(
     >>> law.y_name, law.y_unit, law.x_unit, round(law.largest_error, 3)
     ('pressure', 'MPa', 'mm', 0.024)
     """
-    if quantity not in AGAINST:
-        raise InputError(f"quantity must be one of {tuple(AGAINST)}, got {quantity!r}")
+    require_quantity(quantity)
+    of_registry = quantity not in AGAINST
     of_body = isinstance(surface, ForceLaw)
     heat = quantity == "conductance"
     film = quantity == "film"
     for given, needs, names in (
         (of_body, quantity == "pressure", "a force law"),
         (peklenik is not None, film, "peklenik"),
-        (conductivity is not None or conductivity_unit is not None, heat, "conductivity"),
+        (
+            conductivity is not None or conductivity_unit is not None,
+            heat or of_registry,
+            "conductivity",
+        ),
+        (friction is not None, not of_registry, "friction"),
+        (kappa is not None, not of_registry or friction is None, "kappa"),
         (film, rtol is None, "rtol"),
         (gas is not None, heat, "gas"),
     ):
@@ -162,9 +174,12 @@ def describe_law(
                 f"{names} does not belong to quantity={quantity!r}: leave it out"
             )
     theory = "calibrated" if film and theory is None else theory
+    bodies = E_star
+    if of_registry and conductivity is not None:
+        bodies = _with_conductivity(E_star, hardness, conductivity, conductivity_unit)
     exported = exported_law(
         surface,
-        E_star,
+        bodies,
         length_unit,
         stress_unit,
         variant,
@@ -172,6 +187,7 @@ def describe_law(
         hardness,
         made_by,
         direction,
+        interface,
     )
     least, end = _range(exported, pressures)
     if film:
@@ -180,6 +196,9 @@ def describe_law(
         )
         return _film_rows(exported, count, least, end if pressures else np.inf, peklenik)
     choose = functools.partial(chosen_rows, rows=rows, rtol=rtol, evenly=evenly)
+    if of_registry:
+        choose = functools.partial(choose, most_rows=most_rows)
+        return _rows_of_registry(exported, quantity, least, end, choose)
     scale = 1.0
     unit = exported.stress
     facts = exported.facts
@@ -395,6 +414,84 @@ def _table(
         more,
         facts,
     )
+
+
+def _with_conductivity(
+    E_star: Any, hardness: float | str, conductivity: float, unit: str | None
+) -> Bodies:
+    """The bodies of a modulus, with a conductivity."""
+    if isinstance(E_star, Bodies):
+        raise InputError("conductivity is that of the bodies: leave it out beside Bodies")
+    text = number(number_in("conductivity", conductivity, 1e-300, 1e300))
+    both = conductivity if unit is None else f"{text} {unit}"
+    return Bodies(E_star, hardness=hardness, conductivity=(both, both))
+
+
+def _rows_of_registry(
+    exported: ExportedLaw,
+    quantity: str,
+    least: float | None,
+    end: float,
+    choose: Callable[..., tuple[FloatArray, FloatArray, float]],
+) -> LawTable:
+    """Rows of any quantity of the registry against pressure, between two pressures where they are given."""
+    law = exported.law
+    c, pressure = _curve(exported, "pressure", end, 1.0)
+    rises = np.append(True, np.diff(pressure) > 0)
+    c, pressure = c[rises], pressure[rises]
+    if least is not None:
+        # rows begin at the last fine point below the smallest pressure
+        first = max(int(np.searchsorted(pressure, least, side="right")) - 1, 0)
+        c, pressure = c[first:], pressure[first:]
+    pressed = law.at(separation=law.h_max - 2 * c)
+    declared = registry.get(quantity)
+    values = np.asarray(pressed.quantity(quantity))
+    if values.dtype == bool:
+        raise InputError(f"{quantity} is true or false, and has no rows")
+    values = np.broadcast_to(values, c.shape).astype(float)
+    fine_x, fine_y = _known_part(quantity, pressure, values, least is not None)
+    ends_early = fine_x[-1] < pressure[-1]
+    floor = FLOOR * float(fine_y.max())
+    if fine_y.min() > 0:
+        floor = float(fine_y.min()) * (1 - 1e-9)
+    x, y, error = choose(fine_x, fine_y, floor)
+    unit = declared.unit(pressed)
+    why = f"where {quantity} is no longer known" if ends_early else "where the law ends"
+    if not ends_early and end < exported.c_turn * (1 - ROUNDING):
+        why = "the largest asked for"
+    comments = exported.header(
+        f"{quantity} [{unit}] against pressure [{exported.stress}]: {declared.meaning}",
+        f"pressure from {number(x[0])} to {number(x[-1])} {exported.stress}, {why}",
+        _of_rows(quantity, x.size, error, f"{quantity} {about(floor)} {unit}"),
+        end=end,
+    )
+    names = "pressure", quantity, exported.stress, unit
+    return LawTable(
+        x, y, *names, error, comments, law.theory, floor, facts=exported.facts
+    )
+
+
+def _known_part(
+    name: str, pressure: FloatArray, values: FloatArray, from_first: bool
+) -> tuple[FloatArray, FloatArray]:
+    """The first pressures between which a quantity is finite; from the smallest on, where that was asked for."""
+    is_known = np.isfinite(values)
+    if not is_known.any() or (from_first and not is_known[0]):
+        where = f"at {about(pressure[0])}" if is_known.any() else "at any pressure"
+        raise InputError(f"{name} has no rows: it is not known {where}")
+    first = int(np.argmax(is_known))
+    unknown = np.flatnonzero(~is_known[first:])
+    last = first + int(unknown[0]) if unknown.size else values.size
+    if last - first < MIN_ROWS:
+        raise InputError(f"{name} has no rows: it is known at single pressures alone")
+    part = values[first:last]
+    if not part.any():
+        raise InputError(f"{name} has no rows: it is 0 at all pressures")
+    if (part < 0).any():
+        raise InputError(
+            f"{name} has no rows: it is negative from {about(part.min())} on, and errors of rows are relative"
+        )
+    return pressure[first:last], part
 
 
 def _of_rows(name: str, rows: int, error: float, above: str) -> str:

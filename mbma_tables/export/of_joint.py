@@ -8,14 +8,15 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from mbma_tables import __version__
-from mbma_tables.common.arguments import nearest, require_flag, require_name
+from mbma_tables.bodies import Bodies
+from mbma_tables.common.arguments import nearest, require_flag
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor
 from mbma_tables.export.exported_law import GasInGaps
 from mbma_tables.export.languages import LANGUAGES
 from mbma_tables.export.law_rows import describe_law
-from mbma_tables.export.targets import AGAINST, Target, targets
-from mbma_tables.quantities.interface import Gas
+from mbma_tables.export.targets import AGAINST, Target, require_quantity, targets
+from mbma_tables.quantities.interface import Gas, Interface
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import Theory
 
@@ -34,6 +35,8 @@ class ExportedJoint(NamedTuple):
     kappa_varies: bool  # whether it depends on the contact area
     friction: float | None
     gas: Gas
+    bodies: Bodies
+    interface: Interface
 
 
 def joint_files(
@@ -140,7 +143,7 @@ def _quantities(
     for name in names:
         if not isinstance(name, str):
             raise InputError(f"quantity must be a name or several, got {quantity!r}")
-        require_name("quantity of rows", name, AGAINST)
+        require_quantity(name)
     if len(set(names)) < len(names):
         raise InputError(f"quantity has the same name twice: {quantity!r}")
     if len(names) > 1 and not program.several:
@@ -222,6 +225,16 @@ def _rows(
 ) -> Any:
     """Rows of one quantity."""
     asked = dict(shared)
+    if quantity not in AGAINST:
+        # of the contact of the joint itself
+        del asked["hardness"]
+        return describe_law(
+            joint.surface,
+            joint.bodies,
+            quantity=quantity,
+            interface=joint.interface,
+            **asked,
+        )
     if program.most:
         asked["most_rows"] = program.most.get(quantity)
     if quantity == "conductance":

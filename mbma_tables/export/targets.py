@@ -9,10 +9,12 @@ import pathlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
 from mbma_tables.export.law_table import LawTable
 from mbma_tables.export.text import checked_name, comment
+from mbma_tables.quantities.registry import registry
 
 LAW = frozenset(
     {"theory", "variant", "hardness", "conductivity", "conductivity_unit", "kappa"}
@@ -33,7 +35,8 @@ STAY_WITHIN_ROWS = (
     "Stay within the rows: the solver's behaviour beyond them was not tested."
 )
 MAX_NAME = 80  # letters of a name, as CalculiX and Abaqus read them
-# by quantity: options for it alone, and the abscissa of its rows
+# by quantity: options for it alone, and the abscissa of its rows; any other quantity of the
+# registry has rows against pressure
 OPTIONS = {
     "conductance": {"conductivity", "conductivity_unit"}, "tangential_stiffness": {"kappa"}, "film": {"peklenik"},
 }  # fmt: skip
@@ -121,12 +124,13 @@ class Grammar:
 
     program: str
     mark: str  # of comments
-    body: Mapping[
-        str, Callable[..., str]
-    ]  # by quantity: text below the comments, from the law and the names
     beyond: (
         str  # behaviour of the program outside the rows, and further notes for its user
     )
+    # by quantity: text below the comments, from the law and the names
+    body: Mapping[str, Callable[..., str]] = dataclasses.field(default_factory=dict)
+    # the same text of any quantity, where the program takes all of them
+    of_any: Callable[..., str] | None = None
     most: Mapping[str, int] = dataclasses.field(
         default_factory=dict
     )  # rows that it holds, by quantity
@@ -170,7 +174,8 @@ class Grammar:
         head = self.first + comment([*comments, self.beyond], self.mark)
         if len(laws) > 1 and self.several is not None:
             return head + self.several(laws, **named)
-        return head + self.body[laws[0].quantity](laws[0], **named)
+        text = self.of_any or self.body[laws[0].quantity]
+        return head + text(laws[0], **named)
 
     def _check(self, law: LawTable) -> None:
         """Refuse a law that the program does not take."""
@@ -178,7 +183,11 @@ class Grammar:
         most = self.most.get(law.y_name, law.x.size)
         taken = " or ".join(f"{y} against {AGAINST[y]}" for y in self.body)
         for allowed, takes, got in (
-            (law.quantity in self.body, taken, f"{law.y_name} against {law.x_name}"),
+            (
+                self.of_any is not None or law.quantity in self.body,
+                taken,
+                f"{law.y_name} against {law.x_name}",
+            ),
             (
                 self.units in (None, own),
                 " and ".join(self.units or ()),
@@ -200,7 +209,8 @@ class Grammar:
         for quantity, options in OPTIONS.items():
             takes -= (
                 options
-                if quantity not in self.body
+                if self.of_any is None
+                and quantity not in self.body
                 and not (self.friction and "kappa" in options)
                 else set()
             )
@@ -208,10 +218,10 @@ class Grammar:
             name,
             self,
             takes,
-            quantity=next(iter(self.body)),
+            quantity=next(iter(self.body), "pressure"),
             units=self.units,
             most=self.most,
-            quantities=tuple(self.body),
+            quantities=tuple(self.body or AGAINST),
             several=self.several is not None,
             conducts_gas=self.conducts_gas,
         )
@@ -236,6 +246,11 @@ def write_files(out: pathlib.Path, files: Mapping[str, bytes]) -> list[pathlib.P
         write_file(path, files[end])
         paths.append(path)
     return paths
+
+
+def require_quantity(name: str) -> None:
+    """Refuse a name that is no quantity of rows: neither one of `AGAINST` nor one of the registry."""
+    require_name("quantity of rows", name, dict.fromkeys((*AGAINST, *registry())))
 
 
 @functools.cache

@@ -13,6 +13,8 @@ import importlib
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from mbma_tables.common import units as of_arguments
 from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import MissingError
@@ -105,7 +107,9 @@ class Quantity:
             remedies = "; ".join(dict.fromkeys(need.remedy for need in missing))
             names = " and ".join(need.name for need in missing)
             raise MissingError(f"{self.name} needs {names}, which is missing: {remedies}")
-        return self.compute(state)
+        # ratios may be infinite or undefined where bodies do not touch
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self.compute(state)
 
     def unit(self, state: State) -> str:
         """Its unit in a contact."""

@@ -234,7 +234,11 @@ test_refused = refusals(
     ({"pressures": ("1 kPa",)}, "pressures must be two rising numbers"),
     ({"pressures": "1:2"}, "pressures must be two rising numbers"),
     (HEAT | {"conductivity_unit": 3}, "conductivity_unit is not printable"),
-    ({"quantity": "stiffness"}, "quantity must be one of"),
+    ({"quantity": "stifness"}, "did you mean 'stiffness'"),
+    ({"quantity": "valid"}, "valid is true or false, and has no rows"),
+    ({"quantity": "yielded"}, "yielded has no rows: it is 0"),
+    ({"quantity": "separation"}, "separation has no rows: it is negative"),
+    ({"quantity": "solid_conductance"}, "solid_conductance needs conductivity"),
     ({"quantity": "conductance"}, "conductance needs"),
     ({"surface": Surface([0.5, 0.8], 1.0, 100.0, 1.0, 3.0)}, "not of a batch"),
     (

@@ -226,3 +226,98 @@ def test_available_are_all_quantities_that_a_contact_gives():
                 continue
             given.append(name)
         assert pressed.available() == given
+
+
+RANGE = ("1 MPa", "50 MPa")
+
+
+def test_a_declared_quantity_has_rows(thermal_time):
+    """Rows had a list of their own."""
+    joint = Joint(FACE, bodies=METALS, theory="calibrated")
+    table = json.loads(joint.export("json", RANGE, quantity="thermal_time"))
+    assert table["units"] == {"pressure": "MPa", "thermal_time": "s"}
+    pressures = np.geomspace(1, 50, 300)
+    rows = table["columns"]
+    between = np.interp(pressures, rows["pressure"], rows["thermal_time"])
+    own = joint.at(pressure=[f"{p} MPa" for p in pressures]).thermal_time
+    np.testing.assert_allclose(between, own, rtol=1.1e-3)
+    for target in ("csv", "comsol", "moose", "modelica", "getdp"):
+        text = joint.export(target, RANGE, quantity="thermal_time")
+        assert "thermal_time [s] against pressure [MPa]" in text
+    with pytest.raises(InputError, match=r"CalculiX takes .*got thermal_time"):
+        joint.export("calculix", RANGE, quantity="thermal_time")
+
+
+def test_rows_of_every_quantity_are_those_of_the_contact():
+    """Each quantity of the registry has rows, or an error that names it."""
+    joint = Joint(FACE, bodies=METALS, theory="calibrated")
+    pressed = joint.at(pressure=["3 MPa", "20 MPa"])
+    for name in registry.registry():
+        if name in ("pressure", "separation", "valid", "energy", "stiffness_scatter"):
+            if name != "pressure":
+                with pytest.raises(InputError, match=name):
+                    joint.export("json", RANGE, quantity=name)
+            continue
+        content = joint.export("json", RANGE, quantity=name, length_unit="um")
+        table = json.loads(content)
+        rows = table["columns"]
+        at = np.interp([3, 20], rows["pressure"], rows[name])
+        # stresses of the contact are in GPa, of the rows in MPa
+        of_stress = pressed.units[name].startswith("GPa")
+        own = pressed.quantity(name) * (1000 if of_stress else 1)
+        # the error of a contact is that of its theory, of rows that of their law
+        if name != "error":
+            np.testing.assert_allclose(at, own, rtol=1.2e-3)
+
+
+def test_the_command_writes_rows_of_a_declared_quantity(thermal_time, tmp_path):
+    out = tmp_path / "rows.json"
+    words = "export json --surface challenge --length-unit mm --E-star 25MPa"
+    words += " --conductivity 0.2 --conductivity-unit W/(m_K) --theory calibrated"
+    words += f" --pressures 10kPa:100kPa --quantity thermal_time --out {out}"
+    # conductivity has a blank in its unit
+    asked = [word.replace("m_K", "m K") for word in words.split()]
+    answer = CliRunner().invoke(main, asked, catch_exceptions=False)
+    assert answer.exit_code == 0, answer.output
+    rows = json.loads(out.read_text())["columns"]
+    law = contact_law(
+        Surface.named("challenge").to("mm"),
+        Bodies("25 MPa", conductivity="0.2 W/(m K)"),
+        "calibrated",
+    )
+    own = law.at(pressure="50 kPa").thermal_time
+    assert np.interp(0.05, rows["pressure"], rows["thermal_time"]) == pytest.approx(
+        own, rel=1.1e-3
+    )
+
+
+@pytest.mark.parametrize("command", ["contact -p 50kPa", "curve --points 5"])
+def test_commands_show_a_declared_quantity_and_any_that_is_asked_for(
+    thermal_time, command
+):
+    """Columns of `mbma curve` were a list."""
+    words = f"{command} --surface challenge --length-unit mm --E-star 25MPa --json"
+    words += " --quantity energy_depth,hydraulic_aperture --theory calibrated"
+    asked = [*words.split(), "--conductivity", "0.2 W/(m K)"]
+    answer = CliRunner().invoke(main, asked, catch_exceptions=False)
+    assert answer.exit_code == 0, answer.output
+    report = json.loads(answer.output)
+    columns = report["columns"]
+    law = contact_law(
+        Surface.named("challenge").to("mm"),
+        Bodies("25 MPa", conductivity="0.2 W/(m K)"),
+        "calibrated",
+    )
+    u = np.array(columns["mean_separation"])[-2:]
+    u = u[u > 0]
+    for name in ("thermal_time", "energy_depth", "hydraulic_aperture"):
+        own = law.at(u).quantity(name)
+        np.testing.assert_allclose(columns[name][-2:][: u.size], own, rtol=1e-5)
+        assert report["units"][name] == {"thermal_time": "s"}.get(name, "mm")
+    failed = CliRunner().invoke(main, [*asked, "--quantity", "energy_dept"])
+    assert failed.exit_code != 0
+    assert "did you mean 'energy_depth'" in failed.output
+    failed = CliRunner().invoke(
+        main, words.replace("energy_depth", "thermal_time").split()
+    )
+    assert "thermal_time needs conductivity" in failed.output

@@ -1,7 +1,7 @@
 """Contact laws as columns for COMSOL's interpolation functions."""
 
 from mbma_tables.export.law_table import LawTable
-from mbma_tables.export.targets import AGAINST, Grammar
+from mbma_tables.export.targets import Grammar
 from mbma_tables.export.text import number
 
 
@@ -17,7 +17,7 @@ def columns(law: LawTable) -> str:
 comsol = Grammar(
     program="COMSOL",
     mark="%",
-    body=dict.fromkeys(AGAINST, columns),
+    of_any=columns,
     beyond=(
         "Data format: Spreadsheet; functions by position in file. Interpolation: linear; "
         "extrapolation: none."

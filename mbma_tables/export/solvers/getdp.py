@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from mbma_tables.export.law_table import LawTable
-from mbma_tables.export.targets import AGAINST, Grammar
+from mbma_tables.export.targets import Grammar
 from mbma_tables.export.text import number
 
 
@@ -42,7 +42,7 @@ def _lines(law: LawTable, name: str, rows: str) -> list[str]:
 getdp = Grammar(
     program="GetDP",
     mark="//",
-    body=dict.fromkeys(AGAINST, _functions),
+    of_any=_functions,
     beyond=(
         "GetDP 3.2 stops below the first row and continues the last chord beyond the last one."
     ),

@@ -2,7 +2,7 @@
 
 from mbma_tables.export.law_table import LawTable
 from mbma_tables.export.solvers.comsol import columns
-from mbma_tables.export.targets import AGAINST, Grammar
+from mbma_tables.export.targets import Grammar
 
 
 def _matrix(law: LawTable, name: str) -> str:
@@ -12,7 +12,7 @@ def _matrix(law: LawTable, name: str) -> str:
 modelica = Grammar(
     program="Modelica",
     mark="#",
-    body=dict.fromkeys(AGAINST, _matrix),
+    of_any=_matrix,
     beyond=(
         "smoothness = Modelica.Blocks.Types.Smoothness.LinearSegments; no extrapolation"
     ),

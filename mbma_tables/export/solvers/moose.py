@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from mbma_tables.export.law_table import LawTable
 from mbma_tables.export.solvers.comsol import columns
-from mbma_tables.export.targets import AGAINST, Grammar
+from mbma_tables.export.targets import Grammar
 from mbma_tables.export.text import number
 
 
@@ -38,7 +38,7 @@ def _blocks(law: LawTable, name: str) -> str:
 moose = Grammar(
     program="MOOSE",
     mark="#",
-    body=dict.fromkeys(AGAINST, columns),
+    of_any=columns,
     beyond=(
         "[Functions/law] type = PiecewiseLinear, data_file = THIS, format = columns; constant "
         "outside the rows. Of more than two columns: xy_in_file_only = false, "
@@ -49,7 +49,7 @@ moose = Grammar(
 moose_function = Grammar(
     program="MOOSE",
     mark="#",
-    body=dict.fromkeys(AGAINST, _functions),
+    of_any=_functions,
     beyond=(
         "Constant outside the rows. Of a conductance: type = GapFluxModelConduction, "
         "gap_conductivity_function, with gap_conductivity_function_variable = the contact "
