@@ -248,10 +248,10 @@ def _of_surfaces(own: Range, result: str, samples: Samples) -> Form:
     return Form(steps, tuple(steps), total, f"exp({total})", target)
 
 
-def _of_islands(result: str, samples: Samples) -> Form:
+def _of_islands(own: Range, result: str, samples: Samples) -> Form:
     """The shipped form of an island, right as mu goes to 0 and for deep ones, whose log_Q is the sum."""
     shipped = FUNCTIONS["standard"][result].steps
-    before = {}
+    before = {name: repr(own.ranges[name][0]) for name in sorted(own.fixed)}
     for name, text in shipped.items():
         if name == "log_Q":
             break
@@ -348,6 +348,9 @@ def _chosen(
     )
     letters = values.shape[1]
     degrees = [d for d in DEGREES if math.comb(letters + d, d) >= terms]
+    if not degrees:
+        most = math.comb(letters + DEGREES[-1], DEGREES[-1])
+        raise InputError(f"terms must be at most {most} for this range, got {terms}")
     search = GridSearchCV(
         pipeline,
         {"products__degree": degrees},
@@ -476,8 +479,8 @@ def fit_formula(own: Range, terms: int = 8) -> list[OwnFormula]:
     _check_enough((seen, held_out), count)
     formulas = []
     for result in seen.results:
-        islands = own.of == "islands"
-        form = _of_islands(result, seen) if islands else _of_surfaces(own, result, seen)
+        make_form = _of_islands if own.of == "islands" else _of_surfaces
+        form = make_form(own, result, seen)
         values = evaluate(form.before, seen.arguments)
         matrix = np.stack([values[letter] for letter in form.letters], axis=1)
         search = _chosen(matrix, form.target, seen.groups, count)

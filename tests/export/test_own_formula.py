@@ -79,6 +79,20 @@ def test_errors_of_surfaces_are_those_of_other_surfaces(of_surfaces):
         assert error.max() < 2 * formula.certificate.largest < 0.3
 
 
+def test_a_number_in_place_of_a_range_is_no_argument():
+    own = Range("islands", {"X": (1.0, 12.0), "mu": (5.0, 5.0)}, groups=40, points=12)
+    force, _ = fit_formula(own, 6)
+    assert force.function.arguments == ("X",)
+    exact = greenwood_tripp.solve(4.0, 5.0).phi_F
+    assert abs(force(X=4.0) / exact - 1) < 2 * force.certificate.largest < 0.02
+    names = {}
+    exec(written(own, [force], "python"), names)
+    assert names["phi_F"](4.0) == pytest.approx(float(force(X=4.0)), rel=1e-14)
+    one = {**SURFACES.ranges, "hurst": (0.8, 0.8), "zeta_1": (100.0, 100.0)}
+    with pytest.raises(InputError, match="terms must be at most 28 for this range"):
+        fit_formula(Range("surfaces", one, groups=100), 30)
+
+
 def test_more_terms_err_less_on_groups_left_out():
     errors = [fit_formula(ISLANDS, terms)[0].cross_validated for terms in (3, 8, 20)]
     assert errors[0] > 2 * errors[1] > 4 * errors[2]
