@@ -32,6 +32,7 @@ from benchmarks.kernels import BEFORE, held_out, measured
 from benchmarks.maps import maps
 from benchmarks.rows import LINES, microseconds, report, rounds, times_faster
 from benchmarks.scenes import scenes
+from benchmarks.surrogates import surrogates
 from generate import page
 from generate.files import ROOT
 from mbma_tables import Bodies, Surface, contact, contact_law, greenwood_tripp, open_table
@@ -379,10 +380,13 @@ def fresh_process(rng: np.random.Generator) -> None:
     )
 
 
-@click.command()
+@click.group(invoke_without_command=True)
 @click.option("--write", is_flag=True, help="Put the table into docs/lookup.md.")
-def main(write: bool) -> None:
+@click.pass_context
+def main(context: click.Context, write: bool) -> None:
     """Time the library beside its peers."""
+    if context.invoked_subcommand is not None:
+        return
     rng = np.random.default_rng(SEED)
     load = os.getloadavg()
     click.echo(
@@ -412,6 +416,8 @@ def main(write: bool) -> None:
         machine = f"{os.cpu_count()} cores, load average {load[0]:.1f}."
         page.write("lookup", {"times": f"{machine}\n\n{measured}"}, {}, ROOT)
 
+
+main.add_command(surrogates)
 
 if __name__ == "__main__":
     main()
