@@ -89,6 +89,7 @@ SHARP_HEIGHT = 0.05  # least height of such places, in h_rms
 TALL = 2.5
 TALL_OVER_RING = 1.75
 LARGEST_PLACE = 5
+SHARP_SHARE = 0.2  # of that rise, in wavelengths below `SHARP_STEPS`
 BEYOND_EDGE = 24  # points by which a map is continued for that
 DISTORTED = 2  # and points along its edges that are left out
 CALLED = {"long_cutoff": "a long cut-off", "short_cutoff": "a short cut-off"}
@@ -464,7 +465,7 @@ def _without_sharp_places(treated: Treated, measured: Any) -> Treated:
     usual &= np.pad(np.ones([count - 2 * rim for count in heights.shape], bool), rim)
     scale = float(np.median(short[usual])) / MEDIAN_DEVIATES
     high = usual & (short > SHARP_HEIGHT * np.std(without_polynomial(heights, 1)))
-    tall = usual & _tall_places(heights, treated.periodic)
+    tall = usual & _tall_places(heights, short, treated.periodic)
     places = tall | (high & (short > SHARP * scale))
     count = int(places.sum())
     if (
@@ -489,8 +490,12 @@ def _without_sharp_places(treated: Treated, measured: Any) -> Treated:
     )
 
 
-def _tall_places(heights: FloatArray, periodic: bool) -> Any:
-    """Points of small places that rise steeply above the ring around them."""
+def _tall_places(heights: FloatArray, short: FloatArray, periodic: bool) -> Any:
+    """Points of small places that rise steeply above the ring around them.
+
+    `short` is the magnitude of the shortest wavelengths, which have a share of the rise:
+    peaks of a map that has none are its own, however steep.
+    """
     from scipy.ndimage import maximum_filter, minimum_filter
 
     least = TALL * float(np.std(without_polynomial(heights, 1)))
@@ -500,6 +505,7 @@ def _tall_places(heights: FloatArray, periodic: bool) -> Any:
     places = np.zeros(heights.shape, bool)
     if not steep.any():
         return places
+    sharpest_beside = maximum_filter(short, 3, mode=mode)
     for side in range(2, LARGEST_PLACE + 1):
         ring = np.ones((2 * side + 1,) * 2, bool)
         ring[1:-1, 1:-1] = False
@@ -507,6 +513,7 @@ def _tall_places(heights: FloatArray, periodic: bool) -> Any:
         bottom = minimum_filter(heights, footprint=ring, mode=mode)
         rise = heights - top
         tall = (rise > least) & (rise > TALL_OVER_RING * (top - bottom))
+        tall &= sharpest_beside > SHARP_SHARE * rise
         places |= tall & (heights - lowest_beside > rise / 2)
     return places
 

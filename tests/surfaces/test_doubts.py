@@ -276,3 +276,15 @@ def test_a_regular_pattern_is_refused_with_its_wavelength(pattern):
         OutOfRangeError, match=f"the map holds wavelengths of {length} um only"
     ):
         Surface.from_map(values, 1.0, periodic=True, unit="um")
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("exponent", [0.0, -1.0, -1.8])
+def test_peaks_of_a_map_without_short_wavelengths_are_its_own(seed, exponent):
+    """White noise of wavelengths from four steps on had single peaks that were called dust."""
+    noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((64, 64)))
+    q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
+    q[0, 0] = 1.0
+    band = (q > 3 / 64) & (q < 0.25)
+    heights = np.fft.irfft2(np.where(band, noise * q**exponent, 0))
+    assert not Surface.from_map(heights, dx=1.0, periodic=True).doubts
