@@ -6,8 +6,8 @@ Joints, lubrication, rough bodies, fidelity, and the data set.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -19,7 +19,7 @@ from generate.calibrated_file import QUANTITIES, binned, by_bin
 from generate.files import dataset
 from generate.page import Cell, Measured, panels, percent, table
 from generate.rough_spheres import RADIUS, heights
-from mbma_tables import Joint, Surface, flow_factors, rough_contact
+from mbma_tables import Contact, Joint, Surface, flow_factors, rough_contact
 from mbma_tables.bodies import mean_conductivity
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.data import boundary_elements
@@ -37,6 +37,13 @@ PAIRS = {
 }
 SHORTEST = ("8 um", "2 um")
 PRESSURES = (1.0, 10.0, 100.0)  # MPa
+README_FACE = {"Rq": "0.4 um", "longest": "100 um", "shortest": "2 um", "hurst": 0.8}
+METALS = ("steel 4140 hard", "aluminium 6061 hard")
+# of both faces in the figure over Ra [um]: wavelengths at the middle Ra
+ROUGHNESSES = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
+MIDDLE = 0.8
+BAND_AT_MIDDLE = (800.0, 8.0)
+CONDUCTANCE = "conductance [W/(m² K)]"
 # C and r of phi_x = 1 - C exp(-r H), or 1 + C H^-r from gamma = 3 on: Patir and Cheng 1978,
 # Table 1
 PATIR_CHENG = {
@@ -56,36 +63,128 @@ WIDTHS = (1.0, 2.0, 3.0, 4.5, 7.0, 20.0)  # of the contact over the mean wavelen
 FACE = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
 
 
-def conductances(one: Joint, pressure: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Conductance of the solid [W/(m^2 K)] at pressures [MPa].
+def conductances(
+    one: Joint, pressure: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Conductance of the solid spots [W/(m^2 K)] at pressures [MPa].
 
-    By the law and by the correlation.
+    By the law, with the standard deviation of its logarithm, and by the correlation.
     """
     assert one.pair is not None
     conductivities = [float(text.split()[0]) for text in one.pair.conductivities]
     k = mean_conductivity(*conductivities)
     assert one.pair.hardness is not None
     hardness = 1e3 * float(one.pair.hardness.split()[0])
-    law = one.at_pressure([f"{p} MPa" for p in pressure]).solid_conductance
+    pressed = one.at_pressure([f"{p} MPa" for p in pressure])
     # lengths in um, so that W/(m K) over um is 1e6 W/(m^2 K)
     correlation = cooper_mikic_yovanovich(one.surface, pressure, k, 1.0, hardness)
-    return np.asarray(law), 1e6 * np.asarray(correlation)
+    return (
+        np.asarray(pressed.solid_conductance),
+        np.asarray(pressed.solid_conductance_scatter),
+        1e6 * np.asarray(correlation),
+    )
 
 
 def joints() -> Measured:
     """Stiffness at light loads against boundary elements.
 
-    And conductance against a usual correlation.
+    And conductances: of one joint, against Ra, and against a usual correlation.
     """
-    figure, axes = panels(size=(6.5, 4))
-    blocks = {"light": _light_loads(), "usual": _usual_conductances(axes)}
-    axes.set(
-        xlabel="pressure [MPa]",
-        ylabel="conductance [W/(m² K)]",
-        title="law; dashed: Cooper-Mikic-Yovanovich",
+    figure, axes = panels(1, 2, (9, 4.4))
+    usual = _usual_conductances(axes)
+    figure.legend(
+        *axes[0].get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=2,
+        fontsize="small",
     )
-    axes.legend(fontsize=7)
-    return blocks, {"docs/figures/joints.svg": figure}
+    of_joint, (left, right) = panels(1, 2, (10, 4.4))
+    _draw_conductances(left)
+    _draw_roughnesses(right)
+    for ax in (left, right):
+        ax.set_ylabel(CONDUCTANCE)
+        ax.grid(alpha=0.3)
+        ax.legend(fontsize="small")
+    right.legend(fontsize="small", loc="lower left")
+    pictures = {
+        "docs/figures/joints.svg": figure,
+        "docs/figures/joint_conductance.svg": of_joint,
+    }
+    return {"light": _light_loads(), "usual": usual}, pictures
+
+
+def _draw_with_band(
+    axes: Axes, x: FloatArray, y: FloatArray, scatter: FloatArray, **options: Any
+) -> None:
+    """A line with one standard deviation of its logarithm, where that is known."""
+    (line,) = axes.plot(x, y, **options)
+    low = y * np.exp(-scatter)
+    high = y * np.exp(scatter)
+    axes.fill_between(x, low, high, color=line.get_color(), alpha=0.25, lw=0)
+
+
+def _draw_conductances(axes: Axes) -> None:
+    """Conductances of README's joint over pressure; dotted where they are not valid."""
+    milled = README_FACE | {"Rq": "0.7 um"}
+    joint = Joint(README_FACE, milled, bodies=METALS, nominal_area="4 cm^2")
+    pressure = np.geomspace(0.3, 200, 80)
+    pressed = joint.at_pressure([f"{p} MPa" for p in pressure])
+    titles = {"total": "total", "solid": "solid spots", "gas": "air in the gaps"}
+    for number, (name, title) in enumerate(titles.items()):
+        values = np.asarray(pressed.quantity(f"{name}_conductance"))
+        scatter = np.asarray(pressed.quantity(f"{name}_conductance_scatter"))
+        axes.plot(pressure, values, ":", color=f"C{number}")
+        valid = np.where(pressed.valid, values, np.nan)
+        _draw_with_band(axes, pressure, valid, scatter, color=f"C{number}", label=title)
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlabel="pressure [MPa]",
+        title="steel on aluminium, Rq 0.4 and 0.7 um,\nwavelengths 100 um to 2 um",
+    )
+
+
+def _draw_roughnesses(axes: Axes) -> None:
+    """Conductances over Ra at 10 MPa, of one band of wavelengths and of a scaled one."""
+    titles = {
+        "-": "{:g} um to {:g} um at each Ra".format(*BAND_AT_MIDDLE),
+        "--": f"in proportion to Ra, the same at {MIDDLE:g} um",
+    }
+    for style, title in titles.items():
+        pressed = [_of_roughness(Ra, style == "--") for Ra in ROUGHNESSES]
+        for colour, name in (("C1", "solid"), ("C2", "gas")):
+            value = [float(one.quantity(f"{name}_conductance")) for one in pressed]
+            scatter = [
+                float(one.quantity(f"{name}_conductance_scatter")) for one in pressed
+            ]
+            _draw_with_band(
+                axes,
+                np.array(ROUGHNESSES),
+                np.array(value),
+                np.array(scatter),
+                color=colour,
+                ls=style,
+                label=f"{'solid spots' if name == 'solid' else 'air'}, {title}",
+            )
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlabel="Ra of each face [um]",
+        xticks=ROUGHNESSES,
+        ylim=(600, None),
+        title="steel on aluminium at 10 MPa, by wavelengths",
+    )
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.minorticks_off()
+
+
+def _of_roughness(Ra: float, scaled: bool) -> Contact:
+    """Two faces of one Ra [um] at 10 MPa, and of a band in proportion to it or not."""
+    scale = Ra / MIDDLE if scaled else 1.0
+    longest, shortest = (f"{scale * wavelength} um" for wavelength in BAND_AT_MIDDLE)
+    face = {"Ra": f"{Ra} um", "longest": longest, "shortest": shortest, "hurst": 0.8}
+    joint = Joint(face, face, bodies=METALS, nominal_area="16 cm^2")
+    return joint.at_pressure("10 MPa")
 
 
 def _light_loads() -> str:
@@ -106,23 +205,36 @@ def _light_loads() -> str:
     return table(f"longest wavelengths a side | {contacts}", rows)
 
 
-def _usual_conductances(axes: Axes) -> str:
+def _usual_conductances(panel_of_pair: Sequence[Axes]) -> str:
     """Conductances by law and correlation: lines, and a table at `PRESSURES`."""
     rows = []
     pressure = np.geomspace(0.1, 300, 40)
-    for (name, materials), shortest in itertools.product(PAIRS.items(), SHORTEST):
-        face = {"hurst": 0.8, "longest": "250 um", "shortest": shortest}
-        joint = Joint(
-            face | {"Rq": "1.6 um"},
-            face | {"Rq": "0.8 um"},
-            bodies=materials,
-            nominal_area="4 cm^2",
+    for (name, materials), axes in zip(PAIRS.items(), panel_of_pair, strict=True):
+        for number, shortest in enumerate(SHORTEST):
+            face = {"hurst": 0.8, "longest": "250 um", "shortest": shortest}
+            joint = Joint(
+                face | {"Rq": "1.6 um"},
+                face | {"Rq": "0.8 um"},
+                bodies=materials,
+                nominal_area="4 cm^2",
+            )
+            law, _, correlation = conductances(joint, np.array(PRESSURES))
+            pairs = zip(law, correlation, strict=True)
+            rows.append([name, shortest, *(f"{a:.3g}, {b / a:.2f}" for a, b in pairs)])
+
+            law, scatter, correlation = conductances(joint, pressure)
+            options = {"color": f"C{number}", "label": f"law, 250 um to {shortest}"}
+            _draw_with_band(axes, pressure, law / pressure, scatter, **options)
+            options["label"] = f"Cooper-Mikic-Yovanovich, 250 um to {shortest}"
+            axes.plot(pressure, correlation / pressure, "--", **options)
+        axes.set(
+            xscale="log",
+            xlabel="pressure [MPa]",
+            ylabel="conductance over pressure [W/(m² K MPa)]",
+            title=f"{name}: solid spots, no gas",
         )
-        pairs = zip(*conductances(joint, np.array(PRESSURES)), strict=True)
-        rows.append([name, shortest, *(f"{a:.3g}, {b / a:.2f}" for a, b in pairs)])
-        law, correlation = conductances(joint, pressure)
-        (line,) = axes.loglog(pressure, law, label=f"{name}, {shortest}")
-        axes.loglog(pressure, correlation, "--", color=line.get_color())
+        axes.set_ylim(bottom=0)
+        axes.grid(alpha=0.3)
     columns = " | ".join(f"{p:g} MPa" for p in PRESSURES)
     return table(f"joint | shortest wavelength | {columns}", rows)
 
