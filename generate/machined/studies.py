@@ -184,25 +184,37 @@ def tangential() -> None:
         click.echo(f"{kind}: {off.size} numbers, rms {rms(off):.4f}, {largest}, {within}")
 
 
+def length_ratio(z: FloatArray) -> float:
+    """How much longer waves of a map are along the first axis than across it."""
+    k = np.meshgrid(np.fft.fftfreq(POINTS), np.fft.fftfreq(POINTS), indexing="ij")
+    squared = k[0] ** 2 + k[1] ** 2
+    squared[0, 0] = 1.0
+    power = np.abs(np.fft.fft2(z)) ** 2
+    along = np.sum(power * k[0] ** 2 / squared)
+    return float(np.sum(power * k[1] ** 2 / squared) / along)
+
+
+def film_gaps(
+    z: FloatArray, engine: Contact, loads: Iterable[float]
+) -> list[tuple[float, FloatArray]]:
+    """Contact fractions and gaps of a map: above its highest point, then pressed."""
+    gaps = [(0.0, share * z.max() - z) for share in ABOVE]
+    for load in loads:
+        area = engine.press(load * GRADIENT)["area"]
+        gaps.append((area, engine.gap))
+    return gaps
+
+
 def film_rows() -> FloatArray:
     """Columns of every surface and gap, shape (10, n).
 
     They are lay, gamma, u/h_rms, A/A0, phi and phi_s along and across, and phi by `flow_factors`.
     """
     rows = []
-    k = np.meshgrid(np.fft.fftfreq(POINTS), np.fft.fftfreq(POINTS), indexing="ij")
-    squared = k[0] ** 2 + k[1] ** 2
-    squared[0, 0] = 1.0
     for lay, z, engine in pressed(itertools.product(LAYS, FILM_HURSTS, FILM_SEEDS)):
-        power = np.abs(np.fft.fft2(z)) ** 2
         h_rms = z.std()
-        # how much longer waves are along the first axis than across it
-        gamma = np.sum(power * k[1] ** 2 / squared) / np.sum(power * k[0] ** 2 / squared)
-        # contact and gaps: above the highest point, then pressed
-        gaps = [(0.0, share * z.max() - z) for share in ABOVE]
-        for load in FILM_LOADS:
-            area = engine.press(load * GRADIENT)["area"]
-            gaps.append((area, engine.gap))
+        gamma = length_ratio(z)
+        gaps = film_gaps(z, engine, FILM_LOADS)
         face = Surface.from_map(z, 1.0, periodic=True)
         quick = flow_factors(face, [gap.mean() for _, gap in gaps])
         phi_of_map = np.stack([quick.phi_x, quick.phi_y], axis=1)

@@ -17,6 +17,7 @@ from generate import distances
 from generate.boundary_elements.run import LIGHT_BINS, compared, surfaces
 from generate.calibrated_file import QUANTITIES, binned, by_bin
 from generate.files import dataset
+from generate.machined import studies
 from generate.page import Cell, Measured, panels, percent, table
 from generate.rough_spheres import RADIUS, heights
 from mbma_tables import Contact, Joint, Surface, flow_factors, rough_contact
@@ -26,6 +27,7 @@ from mbma_tables.data import boundary_elements
 from mbma_tables.quantities.conductances import cooper_mikic_yovanovich
 from mbma_tables.rough_body.rough_contact import mean_wavelength
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.theories.simulated.reynolds import flow_and_couette
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,6 +61,10 @@ PATIR_CHENG = {
 FIRST = 3.0
 LAST = 6.0
 SMOOTH = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=1.0, h_max=2.9)
+GAPS = np.geomspace(0.5, 10, 120)  # u/h_rms
+# of the study `film`: lay, Hurst exponent and seed; loads F/(A0 E* g) of 0.06% to 20% contact
+FILM_MAPS = [(1.0, 0.8, 41), (3.0, 0.8, 41)]
+LIGHT_LOADS = (0.0002, 0.0005, 0.0015, 0.004, 0.01, 0.03, 0.08)
 WIDTHS = (1.0, 2.0, 3.0, 4.5, 7.0, 20.0)  # of the contact over the mean wavelength
 FACE = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
 
@@ -246,7 +252,6 @@ def published(gamma: float, H: FloatArray) -> FloatArray:
 
 def lubrication() -> Measured:
     H = np.linspace(FIRST, LAST, 61)
-    u = np.geomspace(0.5, 10, 120)
     rows = []
     figure, (left, right) = panels(1, 2, (10, 4))
     for number, gamma in enumerate(PATIR_CHENG):
@@ -257,16 +262,52 @@ def lubrication() -> Measured:
         name = f"{gamma:g}" if gamma >= 1 else f"1/{1 / gamma:g}"
         off = np.log(by_library / by_fit)
         rows.append([name, np.sqrt(np.mean(off**2)), off[np.abs(off).argmax()]])
-        film = flow_factors(SMOOTH, u, peklenik=peklenik)
-        left.semilogx(u, film.phi_x, color=f"C{number}", label=name)
+        film = flow_factors(SMOOTH, GAPS, peklenik=peklenik)
+        left.semilogx(GAPS, film.phi_x, color=f"C{number}", label=f"gamma {name}")
         left.semilogx(H, by_fit, "o", ms=2, markevery=5, color=f"C{number}")
-        right.semilogx(u, film.shear_x, color=f"C{number}")
-    left.set(xlabel="u/h_rms", ylabel="phi_x (points: Patir and Cheng 1978)", ylim=(0, 2))
-    right.set(xlabel="u/h_rms", ylabel="phi_s")
-    left.legend(title="gamma", fontsize="small")
+    left.set(ylabel="phi_x", ylim=(0, 1.4), title="dots: fits of Patir and Cheng 1978")
+    left.axvline(float(SMOOTH.h_max), color="0.6", lw=0.8, zorder=0)
+    left.legend(fontsize="small", loc="lower right")
+    _draw_shear(right)
+    right.set(ylabel="phi_s", title="dots: Reynolds' equation on simulated gaps")
+    right.legend(fontsize="small", loc="upper right")
+    for axes in (left, right):
+        axes.set(xlabel="mean gap u/h_rms", xscale="log", xticks=(0.5, 1, 2, 3, 5, 10))
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter("")
+        axes.grid(alpha=0.3)
     header = "gamma | root mean square of ln ratio | largest"
     text = table(header, rows, "{} | {:.3f} | {:+.3f}")
     return {"published": text}, {"docs/figures/lubrication.svg": figure}
+
+
+def _draw_shear(axes: Axes) -> None:
+    """Shear flow factors of two maps of the study `film`, with and without a lay.
+
+    By the library with its band, first contact as a bar, and by simulation as dots.
+    """
+    number = itertools.count()
+    for _, z, engine in studies.pressed(FILM_MAPS):
+        h_rms = z.std()
+        gamma = studies.length_ratio(z)
+        top = z.max() / h_rms
+        gaps = [gap for _, gap in studies.film_gaps(z, engine, LIGHT_LOADS)]
+        simulated_u = np.array([gap.mean() / h_rms for gap in gaps])
+        carried = [flow_and_couette(gap, gap.shape)[1] for gap in gaps]
+        simulated = simulated_u[:, None] - np.array(carried) / h_rms
+        alike = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=1.0, h_max=top)
+        film = flow_factors(alike, GAPS, peklenik=gamma)
+        at_contact = flow_factors(alike, [top], peklenik=gamma)
+        # of an isotropic map both axes are the same but for chance: one is enough
+        for axis, name in enumerate("xy" if gamma > 2 else "x"):
+            colour = f"C{next(number)}"
+            ratio = gamma if name == "x" else 1 / gamma
+            shear = getattr(film, f"shear_{name}")
+            options = {"color": colour, "label": f"gamma {ratio:.2g}"}
+            _draw_with_band(axes, GAPS, shear, film.shear_scatter, **options)
+            axes.plot(simulated_u, simulated[:, axis], "o", ms=4, color=colour)
+            first = getattr(at_contact, f"shear_{name}")
+            axes.plot([top], first, "|", ms=14, color=colour)
 
 
 def spheres() -> dict[str, FloatArray]:
