@@ -536,6 +536,11 @@ def test_a_picture_has_the_pressures_that_were_asked_for(joint, tmp_path):
     x = figure.axes[0].lines[0].get_xdata()
     assert (x[0], x[-1]) == (pytest.approx(1e-3), pytest.approx(0.05))
     assert (tmp_path / "joint.svg").stat().st_size > 10_000
+    # axes of one or two decades have numbers between powers of ten
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        shown = {tick.get_text() for tick in axes.get_xticklabels()}
+        assert {"0.001", "0.002", "0.005", "0.01", "0.02", "0.05"} <= shown
     for wrong in (("50 MPa", "1 MPa"), "1 MPa", (0.0, 1.0)):
         with pytest.raises(InputError, match="pressures"):
             joint.plot(pressures=wrong)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 KINDS = ("png", "svg", "pdf")  # formats of files of pictures
+FEW_DECADES = 300.0  # largest over smallest number of an axis that shows 1, 2, 5, 10 ...
 GAP_LABEL = "mean separation  u/h_rms"
 PRESSURE_LABEL = "pressure  F/(A0 E*)"
 LEAKAGE_LABEL = "flow coefficient  k h_rms^3"
@@ -102,9 +103,25 @@ def draw_panels(
             _band(axes, x, y, scatter)
         axes.set(xlabel=x_label, ylabel=label)
         axes.grid(True, which="major", alpha=0.3)
+        _number_ticks(axes)
         if len(lines) > 1:
             axes.legend()
+    if any(axes.collections for axes in figure.axes):
+        figure.suptitle("bands: one standard deviation of the model", fontsize="medium")
     return figure
+
+
+def _number_ticks(axes: Axes) -> None:
+    """Plain numbers on logarithmic axes of few decades, where powers of ten are too sparse."""
+    ticker = needed("matplotlib.ticker")
+    for axis, (low, high) in (
+        (axes.xaxis, axes.get_xlim()),
+        (axes.yaxis, axes.get_ylim()),
+    ):
+        if high / low < FEW_DECADES:
+            axis.set_major_locator(ticker.LogLocator(subs=(1, 2, 5)))
+            axis.set_major_formatter("{x:g}")
+            axis.set_minor_formatter(ticker.NullFormatter())
 
 
 def draw_compression(
