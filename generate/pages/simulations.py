@@ -18,7 +18,7 @@ from generate.boundary_elements.run import LIGHT_BINS, compared, surfaces
 from generate.calibrated_file import QUANTITIES, binned, by_bin
 from generate.files import dataset
 from generate.machined import studies
-from generate.page import Cell, Measured, panels, percent, table
+from generate.page import Cell, Measured, Picture, panels, percent, table
 from generate.rough_spheres import RADIUS, heights
 from mbma_tables import Contact, Joint, Surface, flow_factors, rough_contact
 from mbma_tables.bodies import mean_conductivity
@@ -112,7 +112,7 @@ def joints() -> Measured:
         ax.grid(alpha=0.3)
         ax.legend(fontsize="small")
     right.legend(fontsize="small", loc="lower left")
-    pictures = {
+    pictures: dict[str, Picture] = {
         "docs/figures/joints.svg": figure,
         "docs/figures/joint_conductance.svg": of_joint,
     }
@@ -229,7 +229,8 @@ def _usual_conductances(panel_of_pair: Sequence[Axes]) -> str:
             rows.append([name, shortest, *(f"{a:.3g}, {b / a:.2f}" for a, b in pairs)])
 
             law, scatter, correlation = conductances(joint, pressure)
-            options = {"color": f"C{number}", "label": f"law, 250 um to {shortest}"}
+            options: dict[str, Any] = {"color": f"C{number}"}
+            options["label"] = f"law, 250 um to {shortest}"
             _draw_with_band(axes, pressure, law / pressure, scatter, **options)
             options["label"] = f"Cooper-Mikic-Yovanovich, 250 um to {shortest}"
             axes.plot(pressure, correlation / pressure, "--", **options)
