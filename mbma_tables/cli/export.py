@@ -84,6 +84,10 @@ class _Export(click.Command):
 @options.hardness_option
 @options.variant_option
 @click.option(
+    "--table",
+    help="Of the whole model: FILE.nc of a universal table, in place of the shipped one.",
+)
+@click.option(
     "--check",
     is_flag=True,
     help="Of the whole model: build it and replay its conformance points.",
@@ -109,7 +113,7 @@ def export_command(target: str, out: Path, asked: dict[str, Any], **values: Any)
     if "direction" in given and "leakage" not in given:
         raise InputError("--direction is of leakage: add --leakage or leave it out")
     if code:
-        _export_code(out, values["variant"], "check" in given)
+        _export_code(out, values["variant"], values["table"], "check" in given)
         return
     specimen = _checked_specimen(given.pop("specimen", None))
     if kind.units is not None:
@@ -239,10 +243,10 @@ def _rows_of(target: Target, quantity: str, asked: dict[str, Any]) -> LawTable:
     return law
 
 
-def _export_code(folder: Path, variant: str, check: bool) -> None:
+def _export_code(folder: Path, variant: str, table: str | None, check: bool) -> None:
     from mbma_tables.export import c_code
 
-    for path in c_code.write_code(folder, variant):
+    for path in c_code.write_code(folder, variant, table):
         echo(path)
     if check:
         found = c_code.check(folder)

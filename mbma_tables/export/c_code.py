@@ -36,7 +36,7 @@ from mbma_tables.export.text import (
 )
 from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1
-from mbma_tables.tables.open import universal_model
+from mbma_tables.tables.open import open_table, universal_model
 from mbma_tables.tables.universal import RECORD, UniversalModel
 from mbma_tables.theories import persson
 from mbma_tables.theories.calibrated import table as calibrated_table
@@ -286,12 +286,26 @@ def header(name: str, model: UniversalModel, variant: Variant) -> list[str]:
     ]
 
 
+def _two_numbers(table: os.PathLike[str] | str) -> UniversalModel:
+    """The model of a universal table's file; a four-parameter table is refused."""
+    model = open_table(table)
+    if not isinstance(model, UniversalModel):
+        raise InputError(
+            f"{table} is a table of the paper's four numbers, the C is of a universal one: make that by "
+            "`mbma tables make universal --out FILE.nc`"
+        )
+    return model
+
+
 def write_code(
-    folder: os.PathLike[str] | str, variant: str | Variant = "reported"
+    folder: os.PathLike[str] | str,
+    variant: str | Variant = "reported",
+    table: os.PathLike[str] | str | None = None,
 ) -> list[pathlib.Path]:
     """Write the model as C11, which C++ compiles too, with conformance points and a self-test that replays them.
 
     A missing folder is made, files of the same names are replaced. Returns the files written.
+    `table` is the file of a universal table to write in place of the shipped one.
 
     Examples
     --------
@@ -300,7 +314,7 @@ def write_code(
     ['mbma_model.h', 'mbma_model.c', 'mbma_data.c', 'mbma_selftest.c', 'mbma_conformance.csv']
     """
     rule = get_variant(variant)
-    model = universal_model()
+    model = universal_model() if table is None else _two_numbers(table)
     texts = source_texts(model, rule) | {POINTS_FILE: points_text(model, rule)}
     for name, text in texts.items():
         write_file(pathlib.Path(folder, name), text.encode(), make_folders=True)
@@ -404,4 +418,4 @@ def read_report(text: str) -> Replay:
     )
 
 
-TARGETS = (Target("c", write_code, frozenset({"variant", "check"})),)
+TARGETS = (Target("c", write_code, frozenset({"variant", "table", "check"})),)

@@ -20,6 +20,7 @@ from mbma_tables.tables.open import universal_model
 from mbma_tables.tables.universal import UniversalModel
 from mbma_tables.theories.mbma.closed_forms import FormulaModel
 from mbma_tables.theories.mbma.sums import Sums, by_table
+from mbma_tables.theories.mbma.theory import Mbma
 
 Rows = Iterator[str]
 FORM = "standard"  # the form of island model "formula"
@@ -87,6 +88,14 @@ def formula_rows(X: FloatArray, mu: FloatArray) -> Rows:
     yield from rows("formula", np.array([X, mu])[:, inside], found[:, inside])
 
 
+def covered(
+    model: UniversalModel, surface: Surface, variant: Variant, gaps: FloatArray
+) -> Any:
+    """Whether a table covers all islands of a surface, at each of its gaps."""
+    theory = Mbma(model, variant, RTOL, outside="nan")
+    return np.isfinite(contact(surface, separation=gaps, theory=theory).pressure)
+
+
 def surface_rows(
     surface: tuple[float, ...],
     variant: Variant,
@@ -94,15 +103,17 @@ def surface_rows(
     depths: Any,
     shares: Any,
     E_star: float = 1.0,
+    table: UniversalModel | None = None,
 ) -> Rows:
     """Islands and totals of one surface, gap by gap, and the calibrated law at shares of h_max, by the library."""
     own = Surface(*surface)
-    model = universal_model()
+    model = table or universal_model()
     fields = geometry(approach, own.hurst, own.zeta_1, variant)
     yield from rows(
         "geometry", (approach, own.hurst, own.zeta_1), [fields[name] for name in FIELDS]
     )
     gaps = own.h_max * (1 - np.asarray(depths))
+    gaps = gaps[covered(model, own, variant, gaps)]
     sums = np.zeros((5, gaps.size))
     compression = (own.h_max - gaps) / own.h_rms
     by_table(
@@ -146,15 +157,16 @@ def points_text(model: UniversalModel, variant: Variant) -> str:
     known = points["table_F"], points["table_A"], model.answer(*places).error
     lines = [*rows("phi", places, known, None, points["tolerance"])]
     middle = 0.5 * (X.low + X.high)
+    some = min(1.0, mu.high)
     statuses = {
-        (X.low, 1.0): OK,
-        (X.high, 1.0): OK,
+        (X.low, some): OK,
+        (X.high, some): OK,
         (middle, mu.high): OK,
         (middle, 0.0): OK,
     }
     statuses |= {
-        (np.nextafter(X.low, -np.inf), 1.0): X_BELOW,
-        (np.nextafter(X.high, np.inf), 1.0): X_ABOVE,
+        (np.nextafter(X.low, -np.inf), some): X_BELOW,
+        (np.nextafter(X.high, np.inf), some): X_ABOVE,
     }
     statuses |= {(middle, np.nextafter(mu.high, np.inf)): MU_ABOVE}
     statuses |= dict.fromkeys(
@@ -167,5 +179,5 @@ def points_text(model: UniversalModel, variant: Variant) -> str:
     for surface in SURFACES:
         if surface[2] / surface[1] > max(3.0, variant.floor_u):
             approach = np.geomspace(1e-3, 2 * surface[4] / surface[3], 8)
-            lines += surface_rows(surface, variant, approach, DEPTHS, SHARES)
+            lines += surface_rows(surface, variant, approach, DEPTHS, SHARES, table=model)
     return comment(head, "#") + "\n".join(lines) + "\n"
