@@ -35,7 +35,15 @@ from benchmarks.scenes import scenes
 from benchmarks.surrogates import surrogates
 from generate import page
 from generate.files import ROOT
-from mbma_tables import Bodies, Surface, contact, contact_law, greenwood_tripp, open_table
+from mbma_tables import (
+    Bodies,
+    Joint,
+    Surface,
+    contact,
+    contact_law,
+    greenwood_tripp,
+    open_table,
+)
 from mbma_tables.common.files import shipped_file
 from mbma_tables.theories import Calibrated, Mbma
 from mbma_tables.theories.calibrated.formulas import Law, Spectrum
@@ -48,6 +56,7 @@ SURFACES = 2_000
 GAPS = 100_000
 MANY_GAPS = 1_000_000
 CALLS = 10_000  # of one number: a loop of them, not its first ones
+JOINTS = 10_000
 DESIGNS = 20  # surfaces of a design loop, likewise
 NOMINAL_EXACT = 15_000  # islands/s, a rate to compare with that is not measured here
 SEED = 7
@@ -335,6 +344,55 @@ def few_numbers(rng: np.random.Generator) -> None:
         report(name, 1e6 * spent, "us", at_most=most)
 
 
+def joints(rng: np.random.Generator) -> None:
+    """Two parts of metal: ten thousand designs at once, and one design from its numbers to its table."""
+    band = {
+        "hurst": rng.uniform(0.6, 0.95, JOINTS),
+        "longest": rng.uniform(200.0, 800.0, JOINTS),
+        "shortest": rng.uniform(2.0, 8.0, JOINTS),
+        "unit": "um",
+    }
+    faces = [band | {"Rq": rng.uniform(0.2, most, JOINTS)} for most in (0.8, 1.6)]
+    pressures = rng.uniform(1e-3, 0.05, JOINTS)
+    metals = ("steel 4140 hard", "aluminium 6061 hard")
+
+    def batch() -> None:
+        joint = Joint(*faces, bodies=metals, nominal_area="4 cm^2", friction=0.2)
+        pressed = joint.at_pressure(pressures)
+        for name in pressed.available():
+            pressed.quantity(name)
+
+    one_band = {"hurst": 0.8, "longest": 500.0, "unit": "um"}
+    fresh = itertools.count(1)
+
+    def table(shortest: float) -> None:
+        # a design that nothing is kept of
+        other = {"Rq": 0.7 * (1 + 1e-9 * next(fresh)), "shortest": shortest}
+        joint = Joint(
+            one_band | {"Rq": 0.4, "shortest": 8.0},
+            one_band | other,
+            bodies=metals,
+            nominal_area="4 cm^2",
+        )
+        joint.table(["1 MPa", "10 MPa", "50 MPa"])
+
+    taken = rounds(
+        {
+            "batch": batch,
+            "one": lambda: [table(8.0) for _ in range(DESIGNS)],
+            "two bands": lambda: [table(5.0) for _ in range(DESIGNS)],
+        }
+    )
+    click.echo("\nJoints of two parts of metal")
+    name = f"{JOINTS} joints by pressure, every quantity"
+    report(name, statistics.median(taken["batch"]), "s", at_most=2)
+    for name, key, most in (
+        ("one joint, from its numbers to its table", "one", 5.0),
+        ("one joint whose parts have two bands, likewise", "two bands", None),
+    ):
+        report(name, 1e-3 * microseconds(taken[key], DESIGNS), "ms", at_most=most)
+
+
 FIRST = {
     "import mbma_tables": "m",
     "an answer": "m.contact(m.Surface(0.8, 1.0, 200.0, 1.0, 3.0), separation=1.0)",
@@ -400,6 +458,7 @@ def main(context: click.Context, write: bool) -> None:
         totals,
         laws,
         calibrated,
+        joints,
         maps,
         exported,
         scenes,

@@ -24,6 +24,7 @@ from mbma_tables.common.arguments import (
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import (
     Units,
+    has_text,
     modulus_and_units,
     number_with_unit,
     stated_unit,
@@ -173,16 +174,20 @@ class Bodies:
         return cls(given)
 
     def with_stress_unit(self, unit: str) -> Bodies:
-        """The same bodies, each constant one number, with plain stresses as texts.
+        """The same bodies, with plain stresses as texts where they are one number.
 
-        A plain modulus is in `unit`, a plain hardness in the unit of the modulus.
+        A plain modulus is in `unit`, a plain hardness in the unit of the modulus. Arrays stay
+        as they are: `in_units` takes the unit for them.
         """
-        E_star = number_with_unit("E_star", self.E_star, unit)
+        E_star = self.E_star
+        if not is_array(E_star):
+            E_star = number_with_unit("E_star", E_star, unit)
         hardness = self.hardness
-        is_infinite = np.ndim(hardness) == 0 and hardness == np.inf
-        if hardness is not None and not is_infinite:
+        is_one = hardness is not None and not is_array(hardness)
+        if is_one and not np.array_equal(hardness, np.inf):
             text = materials.hardness(hardness) if isinstance(hardness, str) else hardness
-            with_unit = number_with_unit("hardness", text, stated_unit("E_star", E_star))
+            of_modulus = stated_unit("E_star", E_star) or unit
+            with_unit = number_with_unit("hardness", text, of_modulus)
             # what states its unit already stays as it was written, "200 HV"
             hardness = hardness if with_unit == text else with_unit
         return dataclasses.replace(self, E_star=E_star, hardness=hardness)
@@ -198,6 +203,11 @@ class Bodies:
             if isinstance(hardness, float) or not is_labelled(hardness):
                 hardness = checked_hardness(hardness)[()]
         return BodiesInUnits(self, E_star, hardness, units)
+
+
+def is_array(value: Any) -> bool:
+    """Whether a constant is an array of any kind or a list, not one number or text."""
+    return isinstance(value, list | tuple) or getattr(value, "ndim", 0) > 0
 
 
 def names_metals(given: Any) -> bool:
@@ -234,8 +244,7 @@ class BodiesInUnits:
     def conductivity_has_unit(self) -> bool:
         """Whether conductivities are texts with their unit."""
         conductivity = self.bodies.conductivity
-        each = conductivity if isinstance(conductivity, tuple | list) else [conductivity]
-        return any(isinstance(value, str) for value in each)
+        return has_text(conductivity)
 
     @property
     def hardness_is_given(self) -> bool:
@@ -268,12 +277,20 @@ class BodiesInUnits:
         numbers, unit = self.units.conductivities(*each)
         return mean_conductivity(*numbers), unit
 
-    def require_one_conductivity(self) -> None:
-        """Reject arrays of conductivities, where each constant is one number."""
+    @property
+    def conductivity_if_known(self) -> Any:
+        """k_s as `conductivity` has it; None where it or the unit of length is not known."""
         if self.conductivity_is_given and (
             self.units.length is not None or not self.conductivity_has_unit
         ):
-            one_number("conductivity", self.conductivity[0])
+            return self.conductivity[0]
+        return None
+
+    def require_one_conductivity(self) -> None:
+        """Reject arrays of conductivities, where each constant is one number."""
+        conductivity = self.conductivity_if_known
+        if conductivity is not None:
+            one_number("conductivity", conductivity)
 
     def at(self, E_star: Any, hardness: Any) -> BodiesInUnits:
         """The same bodies with other numbers, such as those of a block of an array."""

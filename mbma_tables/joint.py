@@ -12,14 +12,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.bodies import Bodies, BodiesInUnits
+from mbma_tables.bodies import Bodies, BodiesInUnits, is_array, names_metals
 from mbma_tables.common.arguments import (
+    any_labelled,
+    broadcast_shape,
+    finite_array,
     hinted,
+    is_labelled,
     one_number,
     positive_array,
     require_name,
+    spread,
 )
-from mbma_tables.common.display import Displayed, Variable, dataset_of, saved
+from mbma_tables.common.display import Displayed, Variable, dataset_of, saved, shown
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.plots import draw_panels
 from mbma_tables.common.toml_files import read_toml
@@ -28,6 +33,7 @@ from mbma_tables.common.units import (
     Units,
     factor,
     force_over_area,
+    stated_unit,
 )
 from mbma_tables.contacts.contact import contact_of
 from mbma_tables.contacts.result import Contact
@@ -64,6 +70,8 @@ if TYPE_CHECKING:
 Part = AnySurface | Mapping[str, Any]
 FACES = ("part_a", "part_b")
 EXAMPLE = '{"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}'
+# the unit of a plain modulus
+PLAIN_STRESS = "GPa"
 # pressures over the hardness, and their number, in pictures
 RANGE = (1e-5, 0.3)
 POINTS = 41
@@ -88,6 +96,11 @@ def equivalent(faces: Sequence[Any], nominal_area: Any) -> AnySurface:
 class Joint(JointQuantities, Displayed):
     """Two rough metal parts pressed together: stiffness, real area, gap and conductance from one description.
 
+    Numbers of the parts, `nominal_area`, constants in `Bodies` and those of the gas may be
+    arrays, which broadcast to a batch of joints: quantities of `at_pressure` then have the
+    broadcast shape, with that of the pressures. Tables, plots, laws, sensitivities and
+    exports are of one joint.
+
     Parameters
     ----------
     part_a, part_b : Surface or mapping
@@ -102,7 +115,7 @@ class Joint(JointQuantities, Displayed):
         temper must then be named. Or the effective modulus, "58 GPa"; a plain number is in
         GPa. Plain pressures, here and in every method but `export`, are in the unit of the
         modulus, GPa for metals.
-    nominal_area : float or str, optional
+    nominal_area : array_like or str, optional
         A0 [length^2], from which the highest point of Gaussian heights follows (`Surface`);
         needed for parts that are mappings. Without it, surfaces keep their own highest
         point.
@@ -127,7 +140,8 @@ class Joint(JointQuantities, Displayed):
     InputError, OutOfRangeError
         For any argument that a result would refuse later: the names of gas, theory and
         metals, the hardness, the numbers of a face, of which all that are missing are named
-        at once.
+        at once. For batches of two parts whose wavelengths or Hurst exponents differ: the sum
+        of their spectra is no power law, and known of one joint at a time.
 
     Examples
     --------
@@ -142,13 +156,23 @@ class Joint(JointQuantities, Displayed):
     >>> table = joint.table(["10 MPa", "50 MPa"])
     >>> [f"{value:.3g}" for value in table["total_conductance"].values]
     ['5.72e+04', '2.07e+05']
+
+    Three finishes of one part, each with two hardnesses:
+
+    >>> from mbma_tables import Bodies
+    >>> finishes = ground | {"Rq": ["0.2 um", "0.4 um", "0.8 um"]}
+    >>> hardened = Bodies(metals=metals, hardness=[["0.95 GPa"], ["1.2 GPa"]])
+    >>> batch = Joint(finishes, milled, bodies=hardened, nominal_area="4 cm^2")
+    >>> batch.at_pressure("10 MPa").total_conductance.round(-2)
+    array([[61600., 57200., 47500.],
+           [59300., 54700., 44400.]])
     """
 
     part_a: Part
     part_b: Part | None = None
     _: dataclasses.KW_ONLY
     bodies: Any  # `Bodies` once it is made
-    nominal_area: float | str | None = None
+    nominal_area: ArrayLike | str | None = None
     friction: float | None = None
     direction: str | None = None
     gas: str | Gas | Mapping[str, Any] = "air"
@@ -168,13 +192,14 @@ class Joint(JointQuantities, Displayed):
         # a face made of numbers has the highest point of the nominal area already
         area = None if drawn and len(faces) == 1 else self.nominal_area
         surface = equivalent(list(faces.values()), area)
-        if surface.shape != ():
-            raise InputError(
-                f"a joint is of one surface, got a batch of shape {surface.shape}"
-            )
         object.__setattr__(self, "surface", surface)
+        if is_array(self.bodies) and not names_metals(self.bodies):
+            raise InputError(
+                f"bodies are metals, a modulus of both, or Bodies; got {self.bodies!r}. Of two "
+                "Young's moduli: Bodies(E=..., nu=...); of a batch of joints: Bodies(E_star=[...])"
+            )
         # from here on every route reads the modulus and the hardness with their unit
-        bodies = Bodies.of(self.bodies).with_stress_unit("GPa")
+        bodies = Bodies.of(self.bodies).with_stress_unit(PLAIN_STRESS)
         object.__setattr__(self, "bodies", bodies)
         interface = Interface(self.friction, self.direction, Gas.of(self.gas))
         object.__setattr__(self, "interface", interface)
@@ -186,11 +211,47 @@ class Joint(JointQuantities, Displayed):
         metals: Pair | None = self.bodies.metals
         return metals
 
-    @property
+    @functools.cached_property
     def _in_units(self) -> BodiesInUnits:
         """The bodies as numbers."""
-        in_units: BodiesInUnits = self.bodies.in_units(self.surface)
+        stress = stated_unit("E_star", self.bodies.E_star) or PLAIN_STRESS
+        in_units: BodiesInUnits = self.bodies.in_units(self.surface, stress)
         return in_units
+
+    @functools.cached_property
+    def _arrays(self) -> dict[str, Any]:
+        """All numbers of the joint that may be arrays, by name."""
+        in_units = self._in_units
+        gas = self.interface.gas
+        assert gas is not None
+        numbers = {
+            "parts and nominal_area": self.surface.h_max,
+            "E_star": in_units.E_star,
+            "hardness": in_units.hardness,
+            "conductivity": in_units.conductivity_if_known,
+            "temperature": gas.temperature,
+            "gas_pressure": gas.pascals,
+            "accommodation": gas.accommodation,
+        }
+        return {name: value for name, value in numbers.items() if value is not None}
+
+    @property
+    def _is_labelled(self) -> bool:
+        return any_labelled(self.surface, *self._arrays.values())
+
+    @functools.cached_property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of a batch of joints; () for one."""
+        return broadcast_shape(**self._arrays)
+
+    def require_one(self, what: str) -> None:
+        """Reject a batch where something is of one joint."""
+        if self._is_labelled or self.shape != ():
+            raise InputError(
+                f"{what} is of one joint, and this is a batch"
+                f"{'' if self._is_labelled else f' of shape {self.shape}'}: make a Joint of one "
+                "entry's numbers, or take the quantities of at_pressure(...), which has all entries"
+            )
 
     def _face(self, name: str, part: Any) -> AnySurface:
         """The surface of a part."""
@@ -222,16 +283,10 @@ class Joint(JointQuantities, Displayed):
 
     def _check(self) -> None:
         """Refuse at once what single results would refuse."""
-        gas = self.interface.gas
-        assert gas is not None
-        one_number("temperature", gas.temperature)
-        one_number("gas_pressure", gas.pascals)
-        one_number(
-            "accommodation", 1.0 if gas.accommodation is None else gas.accommodation
-        )
+        if not self._is_labelled:
+            broadcast_shape(**self._arrays)
         checked_friction(self.friction)
         checked_direction(self.direction, self.surface)
-        self._in_units.require_one_conductivity()
         if self.bodies.nu is not None:
             one_number("nu", tangential_ratio(self.bodies.nu, self.bodies.E))
         if isinstance(self.theory, str):
@@ -273,8 +328,8 @@ class Joint(JointQuantities, Displayed):
         except TypeError as fault:
             raise InputError(f"{path}: {fault}") from None
 
-    def pressure_of(self, force: float | str) -> str:
-        """F/A0 of a force on the nominal area, with its unit, as every method with a pressure takes it.
+    def pressure_of(self, force: float | str) -> Any:
+        """F/A0 of a force on the nominal area, with its unit, as every method with a pressure takes it; a list for areas.
 
         Parameters
         ----------
@@ -312,6 +367,9 @@ class Joint(JointQuantities, Displayed):
     ) -> Contact:
         """The contact at a gap, a pressure or an area, as of `contact`: each in first loading.
 
+        They broadcast with the arrays of the joint, and every quantity has the broadcast
+        shape.
+
         Examples
         --------
         >>> from mbma_tables import Joint
@@ -327,12 +385,36 @@ class Joint(JointQuantities, Displayed):
             "pressure": pressure,
             "area": area,
         }
+        for name, value in candidates.items():
+            if value is not None:
+                candidates[name] = self._spread(name, value)
         return contact_of(
-            self.surface, self.bodies, candidates, self.theory, self.interface
+            self.surface, self._of_entries, candidates, self.theory, self.interface
         )
+
+    @functools.cached_property
+    def _of_entries(self) -> BodiesInUnits:
+        """The bodies of a batch, each with a modulus, so that what depends on them alone has its shape."""
+        in_units = self._in_units
+        if self._is_labelled or self.shape == ():
+            return in_units
+        modulus = spread(np.asarray(in_units.E_star), self.shape)
+        return in_units.at(modulus, in_units.hardness)
+
+    def _spread(self, name: str, value: Any) -> Any:
+        """A gap, pressure or area in the units of the joint, for a batch in its shape.
+
+        All quantities have this shape then, also where the gas alone differs.
+        """
+        given = self._in_units.units.number(name, value)
+        if self._is_labelled or is_labelled(given) or self.shape == ():
+            return given
+        numbers = finite_array(name, given)
+        return spread(numbers, broadcast_shape(**{name: numbers}, **self._arrays))
 
     def law(self) -> ContactLaw:
         """The joint's contact law, for many gaps or pressures, as of `contact_law`."""
+        self.require_one("a law")
         return law_of(self.surface, self.bodies, self.theory, None, self.interface)
 
     def sensitivity(self, pressure: float | str) -> Sensitivity:
@@ -366,6 +448,7 @@ class Joint(JointQuantities, Displayed):
         >>> f"conductance goes like Rq^{slopes['part_a.Rq']['conductance']:.2f}"
         'conductance goes like Rq^-0.67'
         """
+        self.require_one("a sensitivity")
         in_units = self._in_units
         chosen = resolve(self.theory, self.surface)
         moduli, modulus_of = self._moduli(in_units)
@@ -573,6 +656,7 @@ class Joint(JointQuantities, Displayed):
         """What an export needs of the joint."""
         from mbma_tables.export.of_joint import ExportedJoint
 
+        self.require_one("an export")
         in_units = self._in_units
         gas = self.interface.gas
         assert gas is not None
@@ -603,6 +687,7 @@ class Joint(JointQuantities, Displayed):
 
     def table(self, pressures: ArrayLike | Sequence[str]) -> xr.Dataset:
         """Every quantity of the joint at pressures, as an xarray Dataset with units and model uncertainties."""
+        self.require_one("a table")
         pressed = self.at_pressure(np.atleast_1d(np.asarray(pressures)).tolist())
         variables = {}
         for name, variable in self.quantities(pressed).items():
@@ -634,6 +719,7 @@ class Joint(JointQuantities, Displayed):
         InputError
             For pressures that do not rise, and an unknown kind of file.
         """
+        self.require_one("a plot")
         if pressures is None:
             return super().plot(path)
         if not isinstance(pressures, tuple | list) or len(pressures) != 2:
@@ -680,7 +766,9 @@ class Joint(JointQuantities, Displayed):
             if hardness is None:
                 hardness = f"not known: name the temper of {self.pair.softer.name}"
         in_units = self._in_units
-        facts["E_star"] = f"{float(in_units.E_star):.4g} {in_units.units.stress}"
+        facts["E_star"] = shown(in_units.E_star, str(in_units.units.stress))
+        if is_array(hardness):
+            hardness = shown(in_units.hardness, str(in_units.units.stress))
         facts["hardness"] = "infinite" if hardness is None else str(hardness)
         facts["theory"] = theory_text(self.surface, self.theory)
         facts["gas"] = Gas.of(self.gas).name
@@ -700,9 +788,11 @@ class Joint(JointQuantities, Displayed):
     _facts = facts
 
     def _variables(self) -> dict[str, Variable]:
+        self.require_one("a dataset")
         return self.quantities(self._range())
 
     def _figure(self) -> Figure:
+        self.require_one("a plot")
         return self._drawn(self._range())
 
     def _drawn(self, pressed: Contact) -> Figure:

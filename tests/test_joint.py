@@ -11,7 +11,12 @@ import subprocess
 
 import numpy as np
 import pytest
+import xarray as xr
+from click.testing import CliRunner
 from helpers import random_map, run
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import mutually_broadcastable_shapes
 
 from mbma_tables import (
     Bodies,
@@ -688,23 +693,49 @@ def test_metals_whose_names_begin_with_a_digit(typed, name):
     ("changed", "match"),
     [
         ({"bodies": None}, "bodies are missing"),
-        ({"bodies": []}, "materials are one or two|is empty"),
-        ({"bodies": ("210 GPa", "70 GPa")}, r"one number, got shape \(2,\)"),
-        ({"bodies": Bodies([100.0, 200.0])}, r"one number, got shape \(2,\)"),
+        ({"bodies": []}, r"bodies are metals.*got \[\]"),
+        ({"bodies": ("210 GPa", "70 GPa")}, r"bodies are metals.*E=.*E_star=\["),
+        ({"bodies": Bodies([[100.0], [200.0, 3.0]])}, "E_star must be real numbers"),
+        ({"bodies": Bodies([100.0, -200.0])}, r"positive, got -200 at \(1,\)"),
         ({"bodies": {"E_star": 1, "x": 2}}, "no argument 'x'"),
         ({"bodies": {"E_star": 1, "hardnes": 2}}, "did you mean 'hardness'"),
         ({"bodies": "42CrMo5"}, "no known unit of stress"),
         ({"bodies": True}, "real numbers"),
         ({"bodies": Bodies(58.0, nu=[0.1, 0.2, 0.3])}, "nu must be one number"),
-        ({"bodies": Bodies(58.0, hardness=[1.0, 2.0])}, "hardness must be one number"),
+        ({"bodies": Bodies(58.0, hardness=[1.0, 0.0])}, r"positive.*got 0 at \(1,\)"),
         (
-            {"bodies": Bodies(58.0, conductivity=np.array([1.0, 2.0]))},
-            "conductivity must be one number",
+            {"bodies": Bodies([57.0, 58.0], hardness=[1.0, 2.0, 3.0])},
+            r"do not broadcast: .*E_star \(2,\), hardness \(3,\)",
+        ),
+        (
+            {"bodies": Bodies(58.0, conductivity=np.array([1.0, -2.0]))},
+            r"positive, got -2 at \(1,\)",
+        ),
+        (
+            {"bodies": Bodies(58.0, conductivity=(["45 W/(m K)", "45 S/m"], 1.0))},
+            "conductivities are numbers, or texts",
+        ),
+        (
+            {"bodies": Bodies(58.0, conductivity=(["45 W/(m K)", "45 S/m"],) * 2)},
+            "both thermal or both electrical",
         ),
         ({"bodies": Bodies(58.0, conductivity="45 furlong")}, "conductivities are"),
         ({"gas": {"name": "air", "temp": 3}}, "no argument 'temp'.*temperature"),
-        ({"gas": Gas(temperature=[300.0, 400.0])}, "temperature .*one number"),
-        ({"gas": Gas(pressure=["1 bar", "2 bar"])}, "pressure .*one number"),
+        (
+            {
+                "gas": Gas(temperature=[300.0, 400.0]),
+                "bodies": Bodies([57.0, 58.0, 59.0]),
+            },
+            r"do not broadcast: .*E_star \(3,\).*temperature \(2,\)",
+        ),
+        (
+            {"part_b": FACE | {"hurst": [0.7, 0.8]}},
+            r"different q0, q1 or hurst, at \(0,\)",
+        ),
+        ({"part_b": FACE | {"Rq": ["1 um", "-1 um"]}}, r"part_b: Rq.*got -1 at \(1,\)"),
+        ({"part_b": FACE | {"Rq": ["1 um", 2.0]}}, "Rq: 2.0 has no unit beside others"),
+        ({"part_b": FACE | {"hurst": []}}, "part_b: hurst is empty"),
+        ({"nominal_area": ["4 cm^2", "nan cm^2"]}, "nominal_area must be"),
         ({"gas": None}, "no gas is named None"),
     ],
     ids=str,
@@ -764,3 +795,211 @@ def test_a_side_that_is_too_short_is_not_said_to_be_long_enough():
         if "a side" in reason
     )
     assert "has 3.98 longest wavelengths a side, fewer than 4" in reason
+
+
+# numbers of a joint of two faces, each of which may be an array
+DRAWN = {
+    "Ra": (0.3, 0.9), "Rq": (0.3, 1.2), "hurst": (0.6, 0.95), "longest": (200.0, 600.0), "shortest": (2.0, 9.0),
+    "nominal_area": (2.0, 6.0), "E_star": (40.0, 120.0), "hardness": (0.8, 3.0), "conductivity": (20.0, 200.0),
+    "temperature": (250.0, 500.0), "gas_pressure": (1e4, 1e6), "accommodation": (0.2, 1.0), "pressure": (1e-3, 0.05),
+}  # fmt: skip
+
+
+def described_by(numbers, theory="calibrated"):
+    """The joint of two faces with these numbers, one or an array for each name."""
+    band = {name: numbers[name] for name in ("hurst", "longest", "shortest")}
+    faces = [band | {name: numbers[name], "unit": "um"} for name in ("Ra", "Rq")]
+    conductivity = np.char.add(numbers["conductivity"].astype(str), " W/(m K)").tolist()
+    bodies = Bodies(
+        numbers["E_star"],
+        hardness=numbers["hardness"],
+        conductivity=(conductivity, "160 W/(m K)"),
+        nu=0.3,
+    )
+    gas = Gas(
+        "helium",
+        temperature=numbers["temperature"],
+        pressure=numbers["gas_pressure"],
+        accommodation=numbers["accommodation"],
+    )
+    area = 1e8 * numbers["nominal_area"]  # um^2 of cm^2
+    return Joint(
+        *faces, bodies=bodies, nominal_area=area, friction=0.2, gas=gas, theory=theory
+    )
+
+
+def compare_with_single_joints(numbers, theory, rtol):
+    """Every quantity of a batch is that of a loop over its joints, and has the broadcast shape."""
+    pressed = described_by(numbers, theory).at_pressure(numbers["pressure"])
+    shape = np.broadcast_shapes(*(value.shape for value in numbers.values()))
+    everywhere = {name: np.broadcast_to(value, shape) for name, value in numbers.items()}
+    names = pressed.available()
+    assert {"total_conductance", "tangential_stiffness", "flow_coefficient", "psi"} <= {
+        *names
+    }
+    for name in names:
+        assert np.shape(pressed.quantity(name)) == shape, name
+    reasons = pressed.reasons
+    for place in np.ndindex(shape):
+        single = {name: np.asarray(value[place]) for name, value in everywhere.items()}
+        alone = described_by(single, theory).at_pressure(float(single["pressure"]))
+        for name in names:
+            np.testing.assert_allclose(
+                pressed.quantity(name)[place],
+                alone.quantity(name),
+                rtol=rtol,
+                err_msg=name,
+            )
+        assert len([1 for mask in reasons.values() if mask[place]]) == len(alone.reasons)
+
+
+@given(
+    shapes=mutually_broadcastable_shapes(num_shapes=len(DRAWN), max_dims=2, max_side=2),
+    seed=st.integers(0, 2**32 - 1),
+)
+@settings(max_examples=15, deadline=None)
+def test_a_batch_is_a_loop_of_joints(shapes, seed):
+    """Whatever of its numbers are arrays, of whatever shapes."""
+    rng = np.random.default_rng(seed)
+    numbers = {
+        name: rng.uniform(*ends, shape)
+        for (name, ends), shape in zip(DRAWN.items(), shapes.input_shapes, strict=True)
+    }
+    compare_with_single_joints(numbers, "calibrated", rtol=1e-10)
+
+
+@pytest.mark.parametrize("theory", ["persson", "greenwood_williamson", "mbma"])
+def test_batches_of_every_theory(theory):
+    rng = np.random.default_rng(3)
+    numbers = {
+        name: rng.uniform(*ends, 3 if name in ("Ra", "hurst", "hardness") else ())
+        for name, ends in DRAWN.items()
+    }
+    numbers = {name: np.asarray(value) for name, value in numbers.items()}
+    compare_with_single_joints(numbers, theory, rtol=1e-7)
+
+
+def test_pressures_broadcast_with_a_batch():
+    faces = FACE, FACE | {"Rq": ["0.4 um", "0.7 um", "1 um"]}
+    batch = Joint(*faces, bodies=METALS, nominal_area="4 cm^2")
+    pressures = [["1 MPa"], ["10 MPa"]]
+    found = batch.at_pressure(pressures)
+    assert found.area.shape == found.psi.shape == (2, 3)
+    assert batch.shape == (3,)
+    assert batch.total_conductance(pressures).shape == (2, 3)
+    one = Joint(FACE, FACE | {"Rq": "0.7 um"}, bodies=METALS, nominal_area="4 cm^2")
+    of_one = one.at_pressure(["1 MPa", "10 MPa"])
+    for name in ("area", "total_conductance", "tangential_stiffness"):
+        np.testing.assert_allclose(
+            found.quantity(name)[:, 1], of_one.quantity(name), rtol=1e-12
+        )
+    with pytest.raises(InputError, match=r"do not broadcast: pressure \(2,\)"):
+        batch.at_pressure(["1 MPa", "10 MPa"])
+    by_area = batch.at(area=found.area)
+    np.testing.assert_allclose(by_area.pressure, found.pressure, rtol=1e-6)
+
+
+def test_a_batch_whose_gas_alone_differs():
+    gas = Gas("helium", temperature=[300.0, 400.0])
+    found = Joint(FACE, bodies=METALS, nominal_area="4 cm^2", gas=gas).at_pressure(
+        "1 MPa"
+    )
+    assert found.gas_conductance.shape == found.area.shape == (2,)
+    hot = Gas("helium", temperature=400.0)
+    alone = Joint(FACE, bodies=METALS, nominal_area="4 cm^2", gas=hot).at_pressure(
+        "1 MPa"
+    )
+    assert found.gas_conductance[1] == pytest.approx(alone.gas_conductance, rel=1e-14)
+
+
+def test_a_plain_batch_of_moduli_is_in_gigapascals():
+    given = {"nominal_area": "4 cm^2", "theory": "calibrated"}
+    plain = Joint(FACE, bodies=Bodies([57.0, 58.0], hardness=[1.5, 2.0]), **given)
+    named = Bodies(["57 GPa", "58000 MPa"], hardness=["1500 MPa", "2 GPa"])
+    found = plain.at_pressure("10 MPa")
+    known = Joint(FACE, bodies=named, **given).at_pressure("10 MPa")
+    np.testing.assert_allclose(found.area, known.area, rtol=1e-14)
+    assert found.units["pressure"] == "GPa"
+    assert plain.at_pressure(0.01).area.tolist() == found.area.tolist()
+    facts = plain.facts()
+    assert facts["E_star"] == "57 to 58 GPa"
+    assert facts["hardness"] == "1.5 to 2 GPa"
+    assert "57 to 58 GPa" in repr(plain)
+
+
+def test_areas_of_a_batch_have_a_pressure_each():
+    areas = ["1 cm^2", "4 cm^2"]
+    batch = Joint(FACE, FACE, bodies=METALS, nominal_area=areas)
+    pressures = batch.pressure_of("4 kN")
+    found = batch.at_pressure(pressures)
+    for place, area in enumerate(areas):
+        one = Joint(FACE, FACE, bodies=METALS, nominal_area=area)
+        alone = one.at_pressure(one.pressure_of("4 kN"))
+        assert found.area[place] == pytest.approx(alone.area, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda joint: joint.table("10 MPa"),
+        lambda joint: joint.plot(),
+        lambda joint: joint.plot(pressures=("1 MPa", "10 MPa")),
+        lambda joint: joint.law(),
+        lambda joint: joint.sensitivity("10 MPa"),
+        lambda joint: joint.export("calculix", ("1 MPa", "50 MPa")),
+        lambda joint: joint.to_dataset(),
+    ],
+)
+@pytest.mark.parametrize("which", ["faces", "gas", "labelled"])
+def test_what_is_of_one_joint_names_the_way_for_a_batch(ask, which):
+    changed = {
+        "faces": {"part_a": FACE | {"Rq": ["0.4 um", "0.7 um"]}},
+        "gas": {"gas": Gas("air", temperature=[300.0, 400.0])},
+        "labelled": {"bodies": Bodies(xr.DataArray([57.0, 58.0], dims="metal"))},
+    }[which]
+    described = {"part_a": FACE, "bodies": METALS, "nominal_area": "4 cm^2"} | changed
+    with pytest.raises(InputError, match=r"of one joint.*batch.*one entry.*at_pressure"):
+        ask(Joint(**described))
+
+
+def test_labelled_numbers_of_a_joint():
+    """DataArrays broadcast by name, lazily where they are lazy."""
+    face = Surface.from_roughness(**FACE, h_max="2 um")
+    heights = xr.DataArray([0.4, 0.7], dims="finish")
+    finishes = dataclasses.replace(face, h_rms=heights, h_max=5 * heights, provenance=())
+    hardness = xr.DataArray([0.95, 1.5, 2.0], dims="metal").chunk(metal=2)
+    bodies = Bodies("57 GPa", hardness=hardness, conductivity="50 W/(m K)", nu=0.3)
+    joint = Joint(finishes, face, bodies=bodies, theory="calibrated")
+    found = joint.at_pressure(xr.DataArray([0.001, 0.01], dims="pressure"))
+    sizes = {"finish": 2, "metal": 3, "pressure": 2}
+    for name in ("area", "total_conductance", "tangential_stiffness", "psi"):
+        value = found.quantity(name)
+        assert dict(value.sizes) == sizes, name
+        assert value.chunks is not None
+    one = dataclasses.replace(face, h_rms=0.7, h_max=3.5)
+    alone = Joint(
+        one,
+        face,
+        bodies=dataclasses.replace(bodies, hardness=1.5),
+        theory="calibrated",
+    ).at_pressure(0.01)
+    place = {"finish": 1, "metal": 1, "pressure": 1}
+    for name in ("area", "total_conductance", "tangential_stiffness"):
+        known = float(found.quantity(name).isel(place))
+        assert known == pytest.approx(float(alone.quantity(name)), rel=1e-10), name
+
+
+def test_a_batch_in_a_file_is_told_of_by_the_command(tmp_path):
+    path = tmp_path / "joint.toml"
+    numbers = "".join(
+        f"{name} = {value!r}\n" for name, value in FACE.items() if name != "Rq"
+    )
+    path.write_text(
+        f'bodies = "steel 1020"\nnominal_area = "4 cm^2"\n[part_a]\n{numbers}'
+        'Rq = ["0.4 um", "0.7 um"]\n',
+        encoding="utf-8",
+    )
+    assert Joint.from_toml(path).at_pressure("1 MPa").area.shape == (2,)
+    refused = CliRunner().invoke(main, ["joint", str(path), "-p", "1MPa"])
+    assert refused.exit_code != 0
+    assert "a table is of one joint, and this is a batch of shape (2,)" in refused.output

@@ -223,6 +223,7 @@ def joint_command(
     from mbma_tables.joint import Joint
 
     joint = Joint.from_toml(file)
+    joint.require_one("a table")
     found = joint.at_pressure(pressure or [joint.pressure_of(each) for each in force])
     values, units = columns_of(found, uncertainties=True)
     facts = joint.facts() | {"theory": found.theory}

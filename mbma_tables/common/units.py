@@ -238,25 +238,33 @@ class Units:
 
     def conductivities(self, *conductivities: Any) -> tuple[list[Any], str]:
         """Conductivities and their unit over this unit of length, an SI unit for texts."""
-        if not any(isinstance(value, str) for value in conductivities):
+        if not has_text(conductivities):
             return list(conductivities), f"conductivity/{unit_of('separation', self)}"
         if self.length is None:
             raise InputError(
                 f"conductivity {conductivities[0]!r} beside lengths whose unit is not known: give "
                 "the surface its unit"
             )
-        numbers = []
-        kinds = set()
-        for value in conductivities:
-            number, kind = _conductivity_per_metre(value)
-            numbers.append(number * factor("m", self.length))
-            kinds.add(kind)
+        kinds = set[str]()
+        numbers = [
+            _conductivities_in(value, factor("m", self.length), kinds)
+            for value in conductivities
+        ]
         if len(kinds) > 1:
             raise InputError(
                 "conductivities are both thermal or both electrical, got "
                 f"{' and '.join(map(repr, conductivities))}"
             )
         return numbers, CONDUCTIVITIES[kinds.pop()]
+
+
+def _conductivities_in(value: Any, metre: float, kinds: set[str]) -> Any:
+    """A conductivity over a unit of length, or a list of them; their kinds are added to `kinds`."""
+    if isinstance(value, list | tuple):
+        return [_conductivities_in(each, metre, kinds) for each in value]
+    number, kind = _conductivity_per_metre(value)
+    kinds.add(kind)
+    return number * metre
 
 
 def _conductivity_per_metre(value: Any) -> tuple[float, str]:
@@ -301,6 +309,13 @@ def resolve(
             )
     units = Units(length=unit) if kind == "length" else Units(stress=unit)
     return {name: units.number(name, value) for name, value in quantities.items()}, unit
+
+
+def has_text(value: Any) -> bool:
+    """Whether a value is a text, or a list with one in it."""
+    if isinstance(value, list | tuple):
+        return any(map(has_text, value))
+    return isinstance(value, str)
 
 
 def _entries(value: Any) -> Iterator[Any]:
@@ -422,8 +437,8 @@ def unit_of(name: str, units: Units) -> str:
     return Dimension(*DIMENSIONS[name]).unit(units)
 
 
-def force_over_area(force: Any, area: Any, length: str | None) -> str:
-    """The pressure of a force on an area [length^2], as a text with its unit.
+def force_over_area(force: Any, area: Any, length: str | None) -> Any:
+    """The pressure of a force on an area [length^2], as a text with its unit; a list for areas.
 
     Forces are texts such as "40 kN", or plain numbers in N.
     """
@@ -445,7 +460,17 @@ def force_over_area(force: Any, area: Any, length: str | None) -> str:
         raise InputError(
             "force needs a nominal area whose unit is known: give the surface its unit"
         )
-    return f"{newtons / (float(size) * factor(length, 'm', power=2)):.15g} Pa"
+    pascals = newtons / (
+        positive_array("nominal_area", size) * factor(length, "m", power=2)
+    )
+    return _pascals(pascals.tolist())
+
+
+def _pascals(numbers: Any) -> Any:
+    """A pressure as a text, or lists of them."""
+    if isinstance(numbers, list):
+        return [_pascals(each) for each in numbers]
+    return f"{numbers:.15g} Pa"
 
 
 def in_unit(surface: Any, unit: str | None) -> Any:

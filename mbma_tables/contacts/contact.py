@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.bodies import Bodies
+from mbma_tables.bodies import Bodies, BodiesInUnits
 from mbma_tables.common.arguments import (
     FloatArray,
     any_labelled,
@@ -131,7 +131,11 @@ def contact_of(
     interface: Interface = NOTHING_BETWEEN,
 ) -> Contact:
     """The contact at one given quantity, with what a joint has between its bodies."""
-    in_units = Bodies.of(bodies).in_units(surface)
+    in_units = (
+        bodies
+        if isinstance(bodies, BodiesInUnits)
+        else Bodies.of(bodies).in_units(surface)
+    )
     question = Question.of(in_units.units, candidates)
     setup = Setup(surface, in_units, resolve(theory, surface, question.name), interface)
     if any_labelled(surface, question.value, in_units.E_star, in_units.hardness):

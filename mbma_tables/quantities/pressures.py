@@ -16,6 +16,11 @@ from mbma_tables.quantities.state import State
 STRESS = Dimension(stress=1)
 
 
+def _in_shape(contact: State, value: Any) -> Any:
+    """What depends on surface and bodies alone: one number where they are one, else in the shape of the contact."""
+    return 0.0 * contact.mean_separation + value if np.ndim(value) else value[()]
+
+
 @quantity(STRESS, "force over nominal area", uncertainty="scatter")
 def pressure(contact: State) -> Any:
     """F/A0 in the unit of E*; F/(A0 E*) where that is 1."""
@@ -57,10 +62,11 @@ def yielded(contact: State) -> Any:
 )
 def psi(contact: State) -> Any:
     """Plasticity index E* g/p_m, g the rms gradient; 0 where the hardness is infinite."""
-    return (contact.E_star * contact.surface.rms_gradient / contact.bodies.hardness)[()]
+    index = contact.E_star * contact.surface.rms_gradient / contact.bodies.hardness
+    return _in_shape(contact, index)
 
 
 @quantity(STRESS, "hardness above which the elastic area is within 5%", is_column=False)
 def elastic_hardness(contact: State) -> Any:
     """Hardness above which the elastic area is within 5%, E* g/1.1 [stress]."""
-    return (contact.E_star * contact.surface.rms_gradient / ELASTIC_PSI)[()]
+    return _in_shape(contact, contact.E_star * contact.surface.rms_gradient / ELASTIC_PSI)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import importlib
+import types
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -147,15 +148,21 @@ def _declared_in(name: str) -> dict[str, Quantity]:
 
 def registry() -> Mapping[str, Quantity]:
     """All quantities by name."""
+    return _declared_in_all(tuple(MODULES))
+
+
+@functools.cache
+def _declared_in_all(modules: tuple[str, ...]) -> Mapping[str, Quantity]:
+    """The quantities of several modules by name: a table of a joint asks for them a hundred times."""
     quantities: dict[str, Quantity] = {}
-    for module in MODULES:
+    for module in modules:
         for name, declaration in _declared_in(module).items():
             if name in quantities:
                 raise ValueError(
                     f"the quantity {name} is declared twice, the second time in {module}"
                 )
             quantities[name] = declaration
-    return quantities
+    return types.MappingProxyType(quantities)
 
 
 def results() -> list[str]:

@@ -197,7 +197,10 @@ def highest_point(
     x = np.sqrt(-2 * np.log(np.minimum(c, 0.5)))
     # the error of a level falls fourfold in each step, or faster: to rounding in 60
     for _ in range(60):
+        last = x
         x = np.sqrt(2 * np.log(np.maximum(x, LEAST) / c))
+        if np.array_equal(x, last):
+            break
     return np.asarray(height * x)
 
 

@@ -65,9 +65,8 @@ class Scatter(NamedTuple):
             np.arange(self.eta.size),
         )
         below = np.minimum(y.astype(int), self.eta.size - 2)
-        low, high = (
-            np.take_along_axis(values, k[None], 0)[0] for k in (below, below + 1)
-        )
+        columns = np.indices(shape, sparse=True)
+        low, high = (values[(row, *columns)] for row in (below, below + 1))
         return np.asarray(low + (high - low) * (y - below))
 
     def standard_deviation(
