@@ -27,6 +27,7 @@ import click
 import numpy as np
 from scipy.interpolate import NdBSpline, RegularGridInterpolator, make_interp_spline
 
+from benchmarks.display import display, display_command
 from benchmarks.exports import exported
 from benchmarks.kernels import BEFORE, held_out, measured
 from benchmarks.maps import maps
@@ -454,6 +455,7 @@ def main(context: click.Context, write: bool) -> None:
         kernels,
         few_numbers,
         fresh_process,
+        display,
         tables,
         totals,
         laws,
@@ -477,6 +479,7 @@ def main(context: click.Context, write: bool) -> None:
 
 
 main.add_command(surrogates)
+main.add_command(display_command)
 
 if __name__ == "__main__":
     main()

@@ -1,6 +1,7 @@
 """Figures, and what results display in a terminal, in a notebook and as Datasets."""
 
 import re
+import subprocess
 import sys
 
 import numpy as np
@@ -120,6 +121,36 @@ def test_what_shows_an_object_neither_solves_nor_draws():
             lambda shown=shown: (shown._facts(), shown == shown.__class__)
         )
         assert not calls_of(lambda shown=shown: (hash(shown), shown in [shown]))
+
+
+def test_what_a_contact_shows_was_read_when_it_was_made():
+    """The first text of a process read the shipped file of the law anew, twice: 40 to 70 ms."""
+    code = """
+import mbma_tables.common.netcdf as netcdf, mbma_tables.theories.evidence as evidence
+from mbma_tables import Bodies, Surface, contact
+surface = Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5, unit="um")
+bodies = Bodies("100 GPa", hardness="1 GPa", conductivity="45 W/(m K)")
+pressed = contact(surface, bodies, pressure="10 MPa", theory="calibrated")
+evidence.read_sealed = netcdf.read_sealed = lambda *_: 1 / 0
+assert "scatter" in repr(pressed) and "unloading_stiffness_scatter" in repr(pressed)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("theory", [None, "calibrated"])
+def test_the_text_of_a_joint_takes_no_solver_into_memory(theory):
+    """It imported all that simulates maps, half a second, to see that its faces are no map."""
+    code = f"""
+import sys
+from mbma_tables import Joint
+face = {{"Rq": "1 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}}
+joint = Joint(face, bodies="steel 1020", nominal_area="4 cm^2", theory={theory!r})
+before = set(sys.modules)
+repr(joint), joint._repr_html_(), hash(joint), joint == 1
+more = set(sys.modules) - before
+assert not [name for name in more if name.split(".")[0] in ("scipy", "netCDF4")], more
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_the_name_of_a_default_is_that_of_its_answers():

@@ -95,38 +95,42 @@ def nodes_of(axes: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def read_group(
-    path: pathlib.Path, group: str = ""
-) -> tuple[dict[str, FloatArray], dict[str, Any], dict[str, Any]]:
-    """Variables and attributes of a file of the calibrated law, or of a group of it, and what its axes cover."""
+# variables, attributes, and what the axes cover, of a file or of a group of it
+Part = tuple[dict[str, FloatArray], dict[str, Any], dict[str, Any]]
+
+
+def read_parts(path: pathlib.Path) -> dict[str, Part]:
+    """A file of the calibrated law, by "", and its groups by name, in one opening."""
     import netCDF4
 
     body = read_sealed(path)
     with HDF5_LOCK, netCDF4.Dataset(path.name, memory=body) as data:
         if getattr(data, "mbma_kind", None) != "calibrated":
             raise TableFileError(f"{path}: is no table of the calibrated law")
-        if group and group not in data.groups:
-            raise TableFileError(
-                f"{path}: has no group {group!r}, only {sorted(data.groups)}"
-            )
         data.set_auto_mask(False)
-        part = data[group] if group else data
-        covered = {
-            name: x.getncattr("covered")
-            for name, x in part.variables.items()
-            if "covered" in x.ncattrs()
-        }
-        return (
-            {name: np.array(x[...]) for name, x in part.variables.items()},
-            part.__dict__,
-            covered,
-        )
+        return {name: _part(part) for name, part in {"": data, **data.groups}.items()}
+
+
+def _part(part: Any) -> Part:
+    """Variables, attributes and covered intervals of an open file or group."""
+    covered = {
+        name: x.getncattr("covered")
+        for name, x in part.variables.items()
+        if "covered" in x.ncattrs()
+    }
+    values = {name: np.array(x[...]) for name, x in part.variables.items()}
+    return values, part.__dict__, covered
 
 
 @shared()
+def shipped_parts() -> dict[str, Part]:
+    """The shipped file, read once: by its law and by whatever states a scatter."""
+    return read_parts(shipped_file(NAME))
+
+
 def shipped_part(group: str) -> tuple[dict[str, FloatArray], dict[str, Any]]:
-    """Variables and attributes of a group of the shipped file, read once."""
-    return read_group(shipped_file(NAME), group)[:2]
+    """Variables and attributes of a group of the shipped file."""
+    return shipped_parts()[group][:2]
 
 
 def shipped_checksum() -> str:

@@ -8,11 +8,16 @@ from collections.abc import Callable
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray, filled
-from mbma_tables.common.files import shipped_file
 from mbma_tables.common.shared import shared
 from mbma_tables.core import core
 from mbma_tables.theories.calibrated.formulas import Constants
-from mbma_tables.theories.evidence import NAME, SurfaceSpline, nodes_of, read_group
+from mbma_tables.theories.evidence import (
+    Part,
+    SurfaceSpline,
+    nodes_of,
+    read_parts,
+    shipped_parts,
+)
 
 AXES = ("hurst", "log_zeta_1", "log_separation")
 
@@ -41,7 +46,12 @@ class Table(SurfaceSpline):
 
 def load(path: pathlib.Path) -> Table:
     """Read a table file; one that is damaged, or is another file, is a TableFileError."""
-    values, facts, covered = read_group(path)
+    return _table_of(read_parts(path)[""])
+
+
+def _table_of(part: Part) -> Table:
+    """The table of a file's variables and attributes."""
+    values, facts, covered = part
     constants = Constants(
         *(float(facts[f"law_{field.name}"]) for field in dataclasses.fields(Constants))
     )
@@ -58,4 +68,4 @@ def load(path: pathlib.Path) -> Table:
 @shared()
 def shipped() -> Table:
     """The shipped table, read once."""
-    return load(shipped_file(NAME))
+    return _table_of(shipped_parts()[""])

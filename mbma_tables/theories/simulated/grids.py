@@ -9,6 +9,13 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from mbma_tables.surfaces.spectral import ROUNDED
+
+if TYPE_CHECKING:
+    from mbma_tables.surfaces.surface import MeasuredSurface
+    from mbma_tables.surfaces.treatment import Treated
 
 # A/A0 of the loads; these were chosen between `TESTED_AREAS`, so that curves between loads were
 # tested too
@@ -20,6 +27,11 @@ TOLERANCE = 1e-5  # of boundary elements
 TESTED_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39, 0.58, 0.78)
 # measured on the full grid, by whose flow that of the quick one is
 FLOW_SCATTER = (0.00729, 0.0153, 0.0185, 0.0327, 0.0327, 0.0327, 0.0327)
+
+
+def steps_along(surface: MeasuredSurface, whole: Treated) -> float:
+    """Sampling steps along the shortest wavelength of a map, but for rounding of its heights."""
+    return surface.shortest(ROUNDED) / max(whole.steps)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -27,7 +27,13 @@ from mbma_tables.theories.calibrated.curves import own_law
 from mbma_tables.theories.calibrated.theory import Calibrated
 from mbma_tables.theories.simulated import own_map
 from mbma_tables.theories.simulated.energy_spline import LoadCurve
-from mbma_tables.theories.simulated.grids import FULL, GRIDS, TESTED_AREAS, Grid
+from mbma_tables.theories.simulated.grids import (
+    FULL,
+    GRIDS,
+    TESTED_AREAS,
+    Grid,
+    steps_along,
+)
 from mbma_tables.theories.simulated.pressing import AREA_OF_FLOW, Press
 
 # scatter increases by this power of a map's `sensitivity_at` over that of most maps, found
@@ -136,7 +142,7 @@ class BoundaryElements(Theory):
             return cls(surface, table.rows, table.points, table, table.origin)  # type: ignore[arg-type]
         whole = own_map.map_of(surface)
         assert isinstance(surface, MeasuredSurface)
-        steps = own_map.steps_along(surface, whole)
+        steps = steps_along(surface, whole)
         mirrored = not whole.periodic
         values, points, cut = own_map.reduced(
             whole.heights - whole.heights.mean(), steps, mirrored, chosen.halvings

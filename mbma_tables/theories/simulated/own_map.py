@@ -16,7 +16,6 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.bearing_curve import Bearing, RadialSpectrum
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.map_simulation import MIN_POINTS, ROUNDING, MapSimulation
-from mbma_tables.surfaces.spectral import ROUNDED
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories.calibrated.curves import own_law
@@ -49,11 +48,6 @@ def sides(treated: Treated) -> tuple[float, float]:
     return treated.heights.shape[0] * treated.steps[0], treated.heights.shape[
         1
     ] * treated.steps[1]
-
-
-def steps_along(surface: MeasuredSurface, whole: Treated) -> float:
-    """Sampling steps along the shortest wavelength of a map, but for rounding of its heights."""
-    return surface.shortest(ROUNDED) / max(whole.steps)
 
 
 def reduced(

@@ -10,7 +10,7 @@ from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.map_simulation import MIN_POINTS, ROUNDING
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.theories.simulated.grids import FULL, GRIDS, QUICK
+from mbma_tables.theories.simulated.grids import FULL, GRIDS, QUICK, steps_along
 
 if TYPE_CHECKING:
     from mbma_tables.theories.simulated.one_map import BoundaryElements
@@ -101,8 +101,6 @@ def is_default(surface: AnySurface) -> bool:
 
 def is_for_simulation(surface: AnySurface) -> bool:
     """Whether a surface has a map that is resolved and pressed within seconds."""
-    from mbma_tables.theories.simulated.own_map import steps_along
-
     if not isinstance(surface, MeasuredSurface):
         return False
     treated = surface.map
