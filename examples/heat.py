@@ -84,7 +84,7 @@ def conductance_table() -> tuple[np.ndarray, np.ndarray]:
     most = float(pressure(np.array(HOLE)))
     k_s = float(mean_conductivity(*CONDUCTIVITY))
     rows = describe_law(
-        JOINT, E_STAR, stress_unit="Pa", quantity="conductance", conductivity=k_s, conductivity_unit="W/(m K)",
+        JOINT, E_STAR, stress_unit="Pa", quantity="solid_conductance", conductivity=k_s, conductivity_unit="W/(m K)",
         theory="calibrated", hardness=HARDNESS, pressures=(1e4, most),
     )  # fmt: skip
     return rows.x, rows.y

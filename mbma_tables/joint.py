@@ -578,8 +578,9 @@ class Joint(JointQuantities, Displayed):
         quantity : str or sequence of str, optional
             Of the rows, as for `describe_law`: data, and programs that interpolate any
             table, take every quantity of a contact. Several for targets "lsdyna", "getdp"
-            and "moose-function". Default: conductance, with the pressure in solvers
-            that have both; without `heat` pressure.
+            and "moose-function". Default: "total_conductance", in a vacuum
+            "solid_conductance", with the pressure in solvers that have both; without `heat`
+            pressure.
         rows, rtol : int and float, optional
             Number of rows, or their largest error of linear interpolation; by default as
             few rows as 1e-3 needs, or as many as the program keeps.

@@ -53,7 +53,7 @@ def test_compliance_checker_finds_nothing(path, tmp_path, monkeypatch):
 
 OF_ROWS = {
     "pressure": {},
-    "conductance": {"conductivity": 2.0, "conductivity_unit": "W/(m K)"},
+    "solid_conductance": {"conductivity": 2.0, "conductivity_unit": "W/(m K)"},
     "tangential_stiffness": {"kappa": 1.2},
     "leakage": {},
     "hydraulic_aperture": {},

@@ -239,6 +239,22 @@ def test_measured_parts_are_what_the_table_files_hold():
         fill("<!-- measured: nothing -->\n<!-- end -->", {"sizes": ""})
 
 
+OF_COMMANDS = re.compile(
+    r"^```\n\$ (mbma (?!cost)[^\n]*)\n(.*?)^```", re.DOTALL | re.MULTILINE
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", ["maps.md", "gallery.md"])
+def test_measured_parts_show_what_commands_print_today(page):
+    """`python -m generate pages` writes them, and they went stale unnoticed."""
+    parts = [part[0] for part in MARKED.finditer(PAGES[page])]
+    blocks = OF_COMMANDS.findall("\n".join(parts))
+    assert blocks
+    for command, shown in blocks:
+        assert_same_output(printed(command), f"```\n$ {command}\n{shown}```")
+
+
 def test_page_of_tables_names_what_files_hold():
     names = set()
     for kind in KINDS:

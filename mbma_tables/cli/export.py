@@ -202,7 +202,7 @@ def write_first(kind: Target, content: bytes) -> None:
 def _rows(target: Target, asked: dict[str, Any]) -> LawTable | list[LawTable]:
     """Rows of each quantity; requested pressures at which they are not valid are reported."""
     heat = (
-        "conductance"
+        "solid_conductance"
         if asked.keys() & {"conductivity", "conductivity_unit"}
         else target.quantity
     )
@@ -227,7 +227,8 @@ def _rows_of(target: Target, quantity: str, asked: dict[str, Any]) -> LawTable:
     from mbma_tables.export.law_rows import describe_law
 
     asked = asked | {"quantity": quantity, "most_rows": target.most.get(quantity)}
-    if target.quantity == "conductance":  # its numbers do not depend on the conductivity
+    # of Lethe, whose numbers do not depend on the conductivity
+    if target.quantity == "solid_conductance":
         asked = {"conductivity": 1.0, "conductivity_unit": "W/(m K)"} | asked
     law = describe_law(**asked)
     if "pressures" not in asked:

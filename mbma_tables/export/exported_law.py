@@ -196,9 +196,11 @@ class ExportedLaw:
         self, gas: GasInGaps | None, unit: str, end: float, included: bool
     ) -> tuple[str, ...]:
         """Lines of a header on what conductance is of: solid spots, and gas in gaps up to an overclosure."""
-        if gas is None or gas.gas.name == VACUUM:
+        is_vacuum = gas is not None and gas.gas.name == VACUUM
+        if gas is None or is_vacuum:
+            name = "total" if is_vacuum and included else "solid"
             return (
-                "conductance is that of the solid spots alone, without gas in the gaps (contact conductance)",
+                f"{name}_conductance is that of the solid spots alone, without gas in the gaps (contact conductance)",
             )
         u = self.law.h_max - end * np.linspace(0, 1, GAS_AT)
         values = gas.conductance(self.answer(u))
@@ -208,7 +210,7 @@ class ExportedLaw:
             for value, pressure in zip(values, pressures, strict=True)
         )
         what = (
-            "conductance is the total (joint) conductance, "
+            "total_conductance (joint conductance) is "
             f"that of the solid spots and of the gas in the gaps together, {gas}"
         )
         if not included:

@@ -122,7 +122,7 @@ def asked_law(
     units: dict[str, str] = {}
     if conducts:
         ratios["solid_conductance"], units["solid_conductance"] = exported.slope(
-            "conductance", conductivity, conductivity_unit
+            "solid_conductance", conductivity, conductivity_unit
         )
     if kappa is not None:
         ratios["tangential_stiffness"], units["tangential_stiffness"] = exported.slope(

@@ -23,7 +23,7 @@ from mbma_tables.export.law_table import (
     chosen_rows,
     rounded,
 )
-from mbma_tables.export.targets import AGAINST, require_quantity
+from mbma_tables.export.targets import AGAINST, CONDUCTANCES, require_quantity
 from mbma_tables.export.text import about, number
 from mbma_tables.islands.variants import Variant
 from mbma_tables.law.law import ROUNDING
@@ -92,8 +92,10 @@ def describe_law(
     length_unit, stress_unit : str, optional
         Units of the rows. A surface or modulus that has another one is converted; one that
         has none is in these.
-    quantity : {"pressure", "conductance", "tangential_stiffness", "leakage", "hydraulic_aperture", "film"} or name
-        Pressure against overclosure, or against pressure conductance, tangential stiffness
+    quantity : {"pressure", "solid_conductance", "total_conductance", "tangential_stiffness",
+    "leakage", "hydraulic_aperture", "film"} or name
+        Pressure against overclosure, or against pressure the conductance of the solid spots,
+        or of these and of a `gas` together, tangential stiffness
         before slip, the flow coefficient k h_rms^3 of the gaps (`ContactLaw.leakage`), or
         the hydraulic aperture k^(1/3) h_rms with the aperture u, the derivative by u and
         the stiffness -dp/du. A film: flow factors (`flow_factors`), asperity pressure and
@@ -131,7 +133,7 @@ def describe_law(
         Of leakage of a simulated map: "x", "y" or degrees from x; else the geometric mean
         of both axes.
     gas : GasInGaps, optional
-        In the gaps, parallel to the solid spots: conductance is then that of both.
+        In the gaps, parallel to the solid spots, for the total conductance.
     most_rows : int, optional
         Rows that the program keeps, taken where neither `rows` nor `rtol` is given and
         fewer miss the usual error.
@@ -154,7 +156,7 @@ def describe_law(
     require_quantity(quantity)
     of_registry = quantity not in AGAINST
     of_body = isinstance(surface, ForceLaw)
-    heat = quantity == "conductance"
+    heat = quantity in CONDUCTANCES
     film = quantity == "film"
     for given, needs, names in (
         (of_body, quantity == "pressure", "a force law"),
@@ -167,12 +169,17 @@ def describe_law(
         (friction is not None, not of_registry, "friction"),
         (kappa is not None, not of_registry or friction is None, "kappa"),
         (film, rtol is None, "rtol"),
-        (gas is not None, heat, "gas"),
+        (gas is not None, quantity == "total_conductance", "gas"),
     ):
         if given and not needs:
             raise InputError(
                 f"{names} does not belong to quantity={quantity!r}: leave it out"
             )
+    if quantity == "total_conductance" and gas is None:
+        raise InputError(
+            "total_conductance needs the gas in the gaps, which is missing: Joint(..., gas='air').export(...), "
+            "or `mbma joint FILE --export TARGET`; without gas it is quantity='solid_conductance'"
+        )
     theory = "calibrated" if film and theory is None else theory
     bodies = E_star
     if of_registry and conductivity is not None:
@@ -360,7 +367,7 @@ def _table(
         floor = (
             least if quantity == "pressure" else float(np.interp(least, fine_x, fine_y))
         )
-    if slope := quantity in ("conductance", "tangential_stiffness"):
+    if slope := quantity in (*CONDUCTANCES, "tangential_stiffness"):
         # below the smallest pressure of interest there is only the row of zero pressure
         used = np.append(True, fine_y[1:] > floor * (1 - 1e-9))
         fine_x = fine_x[used]

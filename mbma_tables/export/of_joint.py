@@ -15,7 +15,14 @@ from mbma_tables.common.units import factor
 from mbma_tables.export.exported_law import GasInGaps
 from mbma_tables.export.languages import LANGUAGES
 from mbma_tables.export.law_rows import describe_law
-from mbma_tables.export.targets import AGAINST, Target, require_quantity, targets
+from mbma_tables.export.targets import (
+    AGAINST,
+    CONDUCTANCES,
+    Target,
+    require_quantity,
+    targets,
+)
+from mbma_tables.quantities.gas import VACUUM
 from mbma_tables.quantities.interface import Gas, Interface
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import Theory
@@ -110,7 +117,7 @@ def _all_rows(
 ) -> Any:
     """Rows of one quantity, or a list of those of several."""
     leakage = shared.pop("leakage", False)
-    wanted = _quantities(program, quantity, leakage, heat)
+    wanted = _quantities(joint, program, quantity, leakage, heat)
     if pressures is not None:
         shared["pressures"] = pressures
     elif wanted != ["film"]:
@@ -127,6 +134,7 @@ def _all_rows(
 
 
 def _quantities(
+    joint: ExportedJoint,
     program: Target,
     quantity: str | Sequence[str] | None,
     leakage: bool,
@@ -134,7 +142,7 @@ def _quantities(
 ) -> list[str]:
     """Names of the quantities of rows: those asked for, else the usual one of the program."""
     if quantity is None:
-        return ["leakage"] if leakage else [_usual(program, heat)]
+        return ["leakage"] if leakage else [_usual(joint, program, heat)]
     if leakage:
         raise InputError("quantity and leakage are both given: give quantity='leakage'")
     names = [quantity] if isinstance(quantity, str) else quantity
@@ -189,11 +197,11 @@ def _refuse(target: str, names: list[str]) -> None:
         raise InputError(f"without effect on {target}: leave {' and '.join(names)} out")
 
 
-def _usual(program: Target, heat: bool | None) -> str:
-    """The quantity of rows where none is asked for: conductance, or what the program takes."""
-    if heat is not False and "conductance" in program.quantities:
-        return "conductance"
-    return program.quantity
+def _usual(joint: ExportedJoint, program: Target, heat: bool | None) -> str:
+    """The quantity of rows where none is asked for: conductance, the total one in a gas, or what the program takes."""
+    of_joint = CONDUCTANCES[1:] if joint.gas.name == VACUUM else CONDUCTANCES
+    taken = [name for name in of_joint if name in program.quantities]
+    return taken[0] if taken and heat is not False else program.quantity
 
 
 def _conductivity(
@@ -237,12 +245,11 @@ def _rows(
         )
     if program.most:
         asked["most_rows"] = program.most.get(quantity)
-    if quantity == "conductance":
+    if quantity in CONDUCTANCES:
         heat, unit = _conductivity(joint, shared)
         asked |= heat
-        gas = GasInGaps(joint.gas, unit)
-        if program.conducts_gas:
-            asked["gas"] = gas
+        if quantity == "total_conductance":
+            asked["gas"] = GasInGaps(joint.gas, unit)
     if rubbed or quantity == "tangential_stiffness":
         asked["kappa"] = joint.kappa
     return describe_law(joint.surface, joint.E_star, quantity=quantity, **asked)

@@ -35,15 +35,24 @@ STAY_WITHIN_ROWS = (
     "Stay within the rows: the solver's behaviour beyond them was not tested."
 )
 MAX_NAME = 80  # letters of a name, as CalculiX and Abaqus read them
+# of a joint: of solid spots and gas together, and of the solid spots alone
+CONDUCTANCES = ("total_conductance", "solid_conductance")
 # by quantity: options for it alone, and the abscissa of its rows; any other quantity of the
 # registry has rows against pressure
 OPTIONS = {
-    "conductance": {"conductivity", "conductivity_unit"}, "tangential_stiffness": {"kappa"}, "film": {"peklenik"},
-}  # fmt: skip
+    "total_conductance": {"conductivity", "conductivity_unit"},
+    "solid_conductance": {"conductivity", "conductivity_unit"},
+    "tangential_stiffness": {"kappa"},
+    "film": {"peklenik"},
+}
 AGAINST = {
-    "pressure": "overclosure", "conductance": "pressure", "tangential_stiffness": "pressure",
-    "leakage": "pressure", "hydraulic_aperture": "pressure", "film": "mean_separation",
-}  # fmt: skip
+    "pressure": "overclosure",
+    **dict.fromkeys(CONDUCTANCES, "pressure"),
+    "tangential_stiffness": "pressure",
+    "leakage": "pressure",
+    "hydraulic_aperture": "pressure",
+    "film": "mean_separation",
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,9 +80,6 @@ class Target:
         str, ...
     ] = ()  # of rows, which the program takes; several in one file where `several`
     several: bool = False
-    conducts_gas: bool = (
-        True  # whether conductance may be that of solid spots and gas together
-    )
     alone: bool = True  # whether the first file can be used without those beside it
     beside: tuple[str, ...] = ()  # ends of the names of other files
 
@@ -145,7 +151,6 @@ class Grammar:
     # the text of several laws below the comments, where a file may have them, from the laws
     # and the names
     several: Callable[..., str] | None = None
-    conducts_gas: bool = True
 
     def __call__(
         self, law: LawTable | Sequence[LawTable], name: str | None = None
@@ -201,19 +206,18 @@ class Grammar:
 
     def target(self, name: str) -> Target:
         """The target of this name."""
+        quantities = self.body if self.of_any is None else OPTIONS
+        of_any: set[str] = set()
+        own: set[str] = set()
+        for quantity, options in OPTIONS.items():
+            of_any |= options
+            own |= options if quantity in quantities else set()
         takes = (
-            ROWS
+            (ROWS - of_any)
+            | own
             | ({"name"} if self.named else set())
             | (FRICTION if self.friction else set())
         )
-        for quantity, options in OPTIONS.items():
-            takes -= (
-                options
-                if self.of_any is None
-                and quantity not in self.body
-                and not (self.friction and "kappa" in options)
-                else set()
-            )
         return Target(
             name,
             self,
@@ -223,7 +227,6 @@ class Grammar:
             most=self.most,
             quantities=tuple(self.body or AGAINST),
             several=self.several is not None,
-            conducts_gas=self.conducts_gas,
         )
 
 

@@ -443,7 +443,7 @@ def test_units_are_printable(which, unit):
         describe_law(
             Surface.named("concrete"),
             13.3,
-            quantity="conductance",
+            quantity="solid_conductance",
             conductivity=1.0,
             rows=5,
             **units,

@@ -20,7 +20,11 @@ from mbma_tables.export.targets import targets
 
 BEARING = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
 SI = {"length_unit": "m", "stress_unit": "Pa"}
-HEAT = {"quantity": "conductance", "conductivity": 50.0, "conductivity_unit": "W/(m K)"}
+HEAT = {
+    "quantity": "solid_conductance",
+    "conductivity": 50.0,
+    "conductivity_unit": "W/(m K)",
+}
 RANGE = {"pressures": ("1 MPa", "0.5 GPa")}
 FILM = {"quantity": "film", "peklenik": 3.0}
 APERTURE = {"quantity": "hydraulic_aperture", "theory": "calibrated"}

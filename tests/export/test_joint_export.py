@@ -79,7 +79,7 @@ def test_rows_have_the_conductance_of_the_gas_too(joint, total):
     content = json.loads(joint.export("json", SPAN))
     columns = content["columns"]
     assert content["y_unit"] == "mW/(mm K)/mm"
-    read = 1000 * np.interp(pressures, columns["pressure"], columns["conductance"])
+    read = 1000 * np.interp(pressures, columns["pressure"], columns["total_conductance"])
     np.testing.assert_allclose(read, total(pressures), rtol=1.1e-3)
     assert "solid spots and of the gas in the gaps together, air at 300.0 K" in " ".join(
         content["comments"]
@@ -102,7 +102,9 @@ def test_without_gas_rows_are_of_the_solid(joint):
     vacuum = dataclasses.replace(joint, gas="vacuum")
     content = json.loads(vacuum.export("json", SPAN))
     read = np.interp(
-        [1.0, 10.0], content["columns"]["pressure"], content["columns"]["conductance"]
+        [1.0, 10.0],
+        content["columns"]["pressure"],
+        content["columns"]["solid_conductance"],
     )
     solid = joint.table(["1 MPa", "10 MPa"])["solid_conductance"].to_numpy()
     np.testing.assert_allclose(1000 * read, solid, rtol=1.1e-3)
@@ -359,7 +361,9 @@ def test_units_are_those_asked_for(joint, total, length, stress):
     )
     assert content["x_unit"] == stress
     assert content["y_unit"] == f"W/({length} K)/{length}"
-    x, y = (np.array(content["columns"][name]) for name in ("pressure", "conductance"))
+    x, y = (
+        np.array(content["columns"][name]) for name in ("pressure", "total_conductance")
+    )
     np.testing.assert_allclose(
         np.interp(1e6 / pascal, x, y) / metre**2, total([1.0])[0], rtol=1.1e-2
     )
@@ -372,7 +376,7 @@ def test_each_quantity_has_its_own_number_of_rows_and_error(joint):
         r"\*\* pressure: (\d+) rows; largest error of linear interpolation (\S+),", card
     )
     heat = re.search(
-        r"\*\* conductance: (\d+) rows; largest error of linear interpolation (\S+),",
+        r"\*\* total_conductance: (\d+) rows; largest error of linear interpolation (\S+),",
         card,
     )
     closure = card.split("TABULAR\n")[1].split("*FRICTION")[0].splitlines()
@@ -397,11 +401,13 @@ def test_rows_are_as_many_as_a_program_keeps(joint):
         InputError, match="needs 27 rows, and the program keeps 20: take a larger rtol"
     ):
         joint.export("calculix", SPAN, rtol=1e-3)
-    with pytest.raises(InputError, match="20 rows of conductance at most here, got 30"):
+    with pytest.raises(
+        InputError, match="20 rows of total_conductance at most here, got 30"
+    ):
         joint.export("calculix", SPAN, rows=30)
 
 
-SEVERAL = ("pressure", "conductance", "tangential_stiffness")
+SEVERAL = ("pressure", "total_conductance", "tangential_stiffness")
 
 
 def test_several_quantities_in_one_file(joint):
@@ -423,7 +429,7 @@ def test_getdp_reads_several_quantities(joint, total, tmp_path):
     joint.export("getdp", SPAN, name="bolt", quantity=SEVERAL, path=tmp_path / "law.pro")
     found = joint.at_pressure("10 MPa")
     c = 1e-3 * float(joint.surface.h_max - found.mean_separation)
-    asked = {"pressure": c, "conductance": 10.0, "tangential_stiffness": 10.0}
+    asked = {"pressure": c, "total_conductance": 10.0, "tangential_stiffness": 10.0}
     prints = "".join(
         f'Print[{{bolt_{name}[{number(x)}]}}, Format "{name} %.17g"];\n'
         for name, x in asked.items()
@@ -442,7 +448,7 @@ def test_getdp_reads_several_quantities(joint, total, tmp_path):
     }
     expected = {
         "pressure": 10.0,
-        "conductance": total([10.0])[0] / 1000,
+        "total_conductance": total([10.0])[0] / 1000,
         "tangential_stiffness": 1e6 * float(found.tangential().stiffness),
     }
     assert read == pytest.approx(expected, rel=1.2e-3)

@@ -18,7 +18,11 @@ from mbma_tables.islands.variants import PRINTED
 from mbma_tables.theories import THEORIES, Mbma
 
 UNITS = {"length_unit": "mm", "stress_unit": "MPa"}
-HEAT = {"quantity": "conductance", "conductivity": 50.0, "conductivity_unit": "mW/K"}
+HEAT = {
+    "quantity": "solid_conductance",
+    "conductivity": 50.0,
+    "conductivity_unit": "mW/K",
+}
 LEAKAGE = {"quantity": "leakage", "theory": "calibrated", "rows": None}
 CONCRETE = Surface.named("concrete")
 
@@ -136,7 +140,11 @@ def test_force_and_conductance_in_one_interaction():
     law = law_of(**HEAT, rows=20)
     plain = law_of(rows=20)
     assert law.largest_error < 2e-2
-    assert (law.x_name, law.y_name, law.y_unit) == ("pressure", "conductance", "mW/K/mm")
+    assert (law.x_name, law.y_name, law.y_unit) == (
+        "pressure",
+        "solid_conductance",
+        "mW/K/mm",
+    )
     text = calculix(law, "JOINT")
     abaqus = solvers.abaqus(law, "JOINT")
     assert (
@@ -238,8 +246,9 @@ test_refused = refusals(
     ({"quantity": "valid"}, "valid is true or false, and has no rows"),
     ({"quantity": "yielded"}, "yielded has no rows: it is 0"),
     ({"quantity": "separation"}, "separation has no rows: it is negative"),
-    ({"quantity": "solid_conductance"}, "solid_conductance needs conductivity"),
-    ({"quantity": "conductance"}, "conductance needs"),
+    ({"quantity": "solid_conductance"}, "conductance needs conductivity"),
+    ({"quantity": "conductance"}, "did you mean '[a-z]+_conductance'"),
+    ({"quantity": "total_conductance"}, "needs the gas .* or `mbma joint FILE"),
     ({"surface": Surface([0.5, 0.8], 1.0, 100.0, 1.0, 3.0)}, "not of a batch"),
     (
         {
@@ -255,7 +264,7 @@ test_refused = refusals(
 test_what_a_solver_does_not_take = refusals(
     lambda target, changed: getattr(solvers, target)(law_of(**changed)),
     ("calculix", {"rows": 201}, "takes 200 rows of pressure at most here, got 201"),
-    ("calculix", HEAT | {"rows": 21}, "takes 20 rows of conductance at most"),
+    ("calculix", HEAT | {"rows": 21}, "takes 20 rows of solid_conductance at most"),
     (
         "calculix",
         {"surface": Surface.named("yang-persson"), "length_unit": "m"},
@@ -264,7 +273,7 @@ test_what_a_solver_does_not_take = refusals(
     (
         "optistruct",
         HEAT,
-        "takes pressure against overclosure here, got conductance against pressure",
+        "takes pressure against overclosure here, got solid_conductance against pressure",
     ),
     *(
         (name, LEAKAGE | {"rows": 50}, "takes pressure against overclosure")
@@ -302,10 +311,10 @@ def test_rows_of_leakage_without_a_block():
     )
 
 
-@pytest.mark.parametrize("quantity", ["pressure", "conductance"])
+@pytest.mark.parametrize("quantity", ["pressure", "solid_conductance"])
 @pytest.mark.parametrize("theory", ["mbma", "calibrated"])
 def test_light_loads_are_within_the_error_too(theory, quantity):
-    asked = HEAT if quantity == "conductance" else {}
+    asked = HEAT if quantity == "solid_conductance" else {}
     law = law_of(rows=None, rtol=1e-2, pressures=("10 Pa", 0.1), theory=theory, **asked)
     pressure = np.geomspace(1.001e-5, 0.0999, 400)
     found = contact(CONCRETE, 13.3, pressure=pressure, theory=theory)
@@ -345,9 +354,9 @@ def test_rows_reach_the_largest_pressure(target, largest, choice):
     assert np.interp(at, c, p) == pytest.approx(largest, rel=law.largest_error + 1e-4)
 
 
-@pytest.mark.parametrize("quantity", ["conductance", "leakage"])
+@pytest.mark.parametrize("quantity", ["solid_conductance", "leakage"])
 def test_rows_against_pressure_reach_the_largest(quantity):
-    heat = quantity == "conductance"
+    heat = quantity == "solid_conductance"
     law = law_of(
         **(
             LEAKAGE
@@ -421,7 +430,10 @@ def test_rows_of_a_law_with_a_hardness():
     )
     # conductance is not the slope of loading
     heat = joint(
-        **asked, quantity="conductance", conductivity=20.0, conductivity_unit="mW/(mm K)"
+        **asked,
+        quantity="solid_conductance",
+        conductivity=20.0,
+        conductivity_unit="mW/(mm K)",
     )
     found = known(pressure=heat.x[heat.x > 2.0])
     assert heat.y[heat.x > 2.0] == pytest.approx(

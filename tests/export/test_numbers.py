@@ -58,7 +58,7 @@ def has_point(token):
 def table_of(values, y_name="pressure", x_name="overclosure"):
     """Rows of numbers that no law has to have made."""
     x = np.unique(np.cumsum(np.asarray(values)))
-    units = {"overclosure": "m", "pressure": "Pa", "conductance": "W/(m^2 K)"}
+    units = {"overclosure": "m", "pressure": "Pa", "solid_conductance": "W/(m^2 K)"}
     facts = {"h_rms": (1.0, "m"), "E_star": (1.0, "Pa")}
     names = x_name, y_name, units[x_name], units[y_name]
     return LawTable(x, x[::-1].copy(), *names, 1e-3, ("rows",), "calibrated", facts=facts)

@@ -118,7 +118,7 @@ def conductance(flux, side=10.0):
 def test_calculix_has_closure_and_conductance_in_one_interaction(tmp_path):
     law = contact_law(ROUGH, "25 MPa", theory="mbma")
     asked = HEAT | {"pressures": ("10 kPa", "2 MPa"), "rows": 20, "theory": "mbma"}
-    rows = describe_law(ROUGH, "25 MPa", quantity="conductance", **asked)
+    rows = describe_law(ROUGH, "25 MPa", quantity="solid_conductance", **asked)
     card = solvers.calculix(rows)
     c = law.h_max - law.at_pressure(PRESSURES).mean_separation
     moved = (each(TOP, f"3, 3, {-down:.9e}") for down in c + 20 * PRESSURES / 1e6)
@@ -248,7 +248,7 @@ def test_calculix_conducts_as_the_law_says(tmp_path, length, stress):
         "25 MPa",
         length_unit=length,
         stress_unit=stress,
-        quantity="conductance",
+        quantity="solid_conductance",
         **asked,
     )
     side = SIDES[length]

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from mbma_tables.export.law_table import LawTable
-from mbma_tables.export.targets import Grammar
+from mbma_tables.export.targets import CONDUCTANCES, Grammar
 from mbma_tables.export.text import number
 
 # columns of a number: CalculiX reads no more of it, so that a longer one may lose its exponent
@@ -51,7 +51,7 @@ def _abaqus(law: LawTable, name: str) -> str:
 abaqus = Grammar(
     program="Abaqus",
     mark="**",
-    body={"pressure": _abaqus, "conductance": _abaqus},
+    body=dict.fromkeys(("pressure", *CONDUCTANCES), _abaqus),
     beyond=(
         "Abaqus continues the last slope beyond the last row: stay within the range."
     ),

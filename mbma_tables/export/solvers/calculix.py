@@ -7,7 +7,7 @@ import numpy as np
 from mbma_tables.common.errors import InputError
 from mbma_tables.export.law_table import LawTable
 from mbma_tables.export.solvers.abaqus import card, field, interaction
-from mbma_tables.export.targets import Grammar
+from mbma_tables.export.targets import CONDUCTANCES, Grammar
 from mbma_tables.export.text import about, opening
 
 # closer overclosures are moved apart by the reader
@@ -99,10 +99,10 @@ def _of_heat(law: LawTable, name: str) -> str:
 calculix = Grammar(
     program="CalculiX",
     mark="**",
-    body={"pressure": _of_pressure, "conductance": _of_heat},
+    body={"pressure": _of_pressure, **dict.fromkeys(CONDUCTANCES, _of_heat)},
     beyond="CalculiX keeps the value of the last row beyond it.",
     # of more conductances, 2.20 keeps the last twenty, without a message
-    most={"pressure": 200, "conductance": 20},
+    most={"pressure": 200, **dict.fromkeys(CONDUCTANCES, 20)},
     named="ROUGH",
     friction="Its stick slope is that of one pressure.",
 )

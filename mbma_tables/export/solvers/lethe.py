@@ -60,10 +60,9 @@ def _lethe(law: LawTable) -> str:
 lethe = Grammar(
     program="Lethe",
     mark="#",
-    body={"conductance": _lethe},
+    body={"solid_conductance": _lethe},
     beyond=(
         "For contacts pressed as hard as in this range. Lethe adds the gas in the gaps itself."
     ),
     units=SI,
-    conducts_gas=False,
 )

@@ -6,12 +6,12 @@ They are without *END, which would end the including deck.
 from collections.abc import Sequence
 
 from mbma_tables.export.law_table import LawTable
-from mbma_tables.export.targets import STAY_WITHIN_ROWS, Grammar
+from mbma_tables.export.targets import CONDUCTANCES, STAY_WITHIN_ROWS, Grammar
 from mbma_tables.export.text import number
 
 # columns of a field
 WIDTH = 20
-TAKES = ("pressure", "conductance", "tangential_stiffness", "leakage")
+TAKES = ("pressure", *CONDUCTANCES, "tangential_stiffness", "leakage")
 
 
 def _curve(law: LawTable, curve: int = 1) -> str:
