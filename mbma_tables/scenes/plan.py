@@ -22,7 +22,13 @@ import numpy as np
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.islands.island_models import AnyModel
-from mbma_tables.scenes.problem import INVERTED, OF_CONTACT, OUTPUTS, REFINEMENTS, Problem
+from mbma_tables.scenes.problem import (
+    INVERTED,
+    OUTPUTS,
+    REFINEMENTS,
+    Problem,
+    of_contact,
+)
 from mbma_tables.tables.island4d import Island4dModel
 from mbma_tables.tables.universal import UniversalModel
 
@@ -331,14 +337,14 @@ class _Planner:
         problem = self.problem
         outputs = problem.outputs
         hertz = "area" in outputs and "subscale_area" in problem.dropped
-        of_contact = [name for name in OF_CONTACT if name in outputs]
+        why = of_contact(outputs)
         if hertz:
-            of_contact.remove("area")
+            why.remove("area")
         if problem.prescribed in INVERTED:
-            of_contact.append(f"{problem.prescribed} prescribed")
+            why.append(f"{problem.prescribed} prescribed")
         steps = []
-        if of_contact:
-            steps.append(self.contact(of_contact))
+        if why:
+            steps.append(self.contact(why))
         if hertz:
             what = "adaptive sum over islands with eta = 1, the Hertz area"
             steps.append(
@@ -399,8 +405,10 @@ class _Planner:
         outputs = self.problem.outputs
         requirements = {
             "inverse": self.problem.prescribed in INVERTED,
-            "slopes": bool(outputs & {"stiffness", "solid_conductance"}),
-            "energy": "energy" in outputs,
+            # so may other quantities of the registry
+            "slopes": bool(outputs & {"stiffness", "solid_conductance"})
+            or not outputs <= set(OUTPUTS),
+            "energy": self.problem.computes("energy"),
             "yield": "yield" in outputs,
         }
         parts = frozenset(part for part, is_needed in requirements.items() if is_needed)
@@ -460,7 +468,7 @@ class _Planner:
             theory=theory,
         )
         # a law has force and area only
-        if not self.problem.outputs & set(OF_CONTACT) <= {"pressure", "area"}:
+        if not {*of_contact(self.problem.outputs)} <= {"pressure", "area"}:
             return step
         rtol = max(
             (1 - ISLAND_SHARE) * self.rtol / AMPLIFICATION["inverse"], MIN_LAW_RTOL

@@ -21,6 +21,7 @@ from mbma_tables.common.units import Units, modulus_and_units, require_surface
 from mbma_tables.islands.island_models import ISLAND_MODELS, AnyModel
 from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.materials import hardness_in
+from mbma_tables.quantities.registry import registry
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.tables.island4d import Island4dModel
 from mbma_tables.tables.universal import UniversalModel
@@ -28,7 +29,8 @@ from mbma_tables.theories import OF_MAPS, THEORIES, default_name, resolve
 from mbma_tables.theories.base import Theory
 from mbma_tables.theories.mbma.models import with_table
 
-# effects, described in docs/scenes.md: those that are read from one contact, and others
+# effects, described in docs/scenes.md: those that are read from one contact, and others; any
+# further quantity of the registry is an effect of its name
 OF_CONTACT = (
     "pressure",
     "area",
@@ -57,6 +59,23 @@ NEEDS = {  # what an effect needs and no other uses
     "pressure_profile": ("deltas", "the approaches of the islands"),
     "comparison": ("theories", f"one or more of {', '.join(THEORIES)}"),
 }
+
+
+def effects() -> dict[str, None]:
+    """Names of all effects: `OUTPUTS`, and every other quantity of the registry."""
+    return dict.fromkeys((*OUTPUTS, *registry()))
+
+
+def of_contact(outputs: Iterable[str]) -> list[str]:
+    """Effects among `outputs` that are read from one contact."""
+    names = dict.fromkeys((*OF_CONTACT, *registry()))
+    return [name for name in names if name in outputs]
+
+
+def is_made_of(name: str, effect: str) -> bool:
+    """Whether an effect is another one, or a quantity of the registry that is made of it."""
+    parts = registry()[name].made_of if name in registry() else ()
+    return name == effect or any(is_made_of(part, effect) for part in parts)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -174,7 +193,7 @@ class Problem:
     def _choose_effects(self) -> None:
         """Set the requested outputs and the refinements switched off, checked with each other."""
         for name in self.effects:
-            require_name("effect", name, OUTPUTS)
+            require_name("effect", name, effects())
         for name in self.without:
             require_name("refinement", name, REFINEMENTS)
         outputs = frozenset(self.effects)
@@ -191,7 +210,7 @@ class Problem:
                 )
                 raise InputError(f"{excluded}: leave one of the two out")
         if "finite_height" in dropped:
-            needs_end = sorted(outputs & set(OF_CONTACT[2:]))
+            needs_end = sorted({*of_contact(outputs)} - {"pressure", "area"})
             if needs_end:
                 effect = repr(needs_end[0])
                 remedy = f"leave finite_height on, or {effect} out"
@@ -245,9 +264,10 @@ class Problem:
             # no theories are an empty list
             if name == "theories":
                 is_given = argument not in (None, ())
-            if effect in self.outputs and not is_given:
-                raise InputError(f"effect {effect!r} needs {name}: {meaning}")
-            if effect not in self.outputs and is_given:
+            if self.computes(effect) and not is_given:
+                asked = [each for each in self.effects if is_made_of(each, effect)]
+                raise InputError(f"effect {asked[0]!r} needs {name}: {meaning}")
+            if not self.computes(effect) and is_given:
                 remedy = f"add it to the effects, or leave {name} out"
                 raise InputError(f"{name} given and effect {effect!r} is off: {remedy}")
         if self.hardness is not None:
@@ -297,6 +317,10 @@ class Problem:
         if options:
             not_of = f"of theory 'mbma', not of {self.theory_name!r}"
             raise InputError(f"{' and '.join(options)}: {not_of}: leave out")
+
+    def computes(self, effect: str) -> bool:
+        """Whether an effect is requested, or a quantity that is made of it."""
+        return any(is_made_of(name, effect) for name in self.outputs)
 
     @property
     def sums_islands(self) -> bool:

@@ -24,7 +24,7 @@ from mbma_tables.islands.variants import get_variant
 from mbma_tables.materials import ELASTIC_PSI
 from mbma_tables.quantities.registry import registry, unit_of
 from mbma_tables.scenes.plan import AMPLIFICATION, TABLES, Plan, Step
-from mbma_tables.scenes.problem import INVERTED, OF_CONTACT, Problem
+from mbma_tables.scenes.problem import INVERTED, Problem
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import Surface
@@ -108,7 +108,7 @@ def _keep_quantities(run: Run, pressed: Contact) -> None:
     """Record the requested quantities of a contact."""
     problem = run.problem
     requested = problem.outputs
-    names = [name for name in OF_CONTACT[:4] if name in requested]
+    names = [name for name in registry() if name in requested]
     # the Hertz area has a step of its own
     if "area" in names and "subscale_area" in problem.dropped:
         names.remove("area")
@@ -116,9 +116,9 @@ def _keep_quantities(run: Run, pressed: Contact) -> None:
         names += VALIDITY
     if "yield" in requested:
         names += YIELDED
-    run.keep({name: getattr(pressed, name) for name in names})
-    if "solid_conductance" in requested:
-        run.keep({"solid_conductance": pressed.solid_conductance})
+    # some are one number for all gaps
+    shape = np.shape(pressed.mean_separation)
+    run.keep({name: np.broadcast_to(pressed.quantity(name), shape) for name in names})
     if "leakage" in requested:
         leakage = pressed.leakage
         run.keep(

@@ -29,7 +29,8 @@ class Scene(Problem):
     surface : Surface
         One surface, not a batch.
     effects : sequence of str
-        Requested effects, names of `mbma_tables.scenes.problem.OUTPUTS`.
+        Requested effects: names of `mbma_tables.scenes.problem.OUTPUTS`, and of any further
+        quantity of a contact.
     without : sequence of str
         Refinements of the model switched off: "subscale_area", "sphere_deformation",
         "finite_height".

@@ -17,6 +17,7 @@ from mbma_tables.common.plain_text import visible
 from mbma_tables.common.toml_files import check, read_toml
 from mbma_tables.common.units import Units, factor, in_unit, known, resolve
 from mbma_tables.materials import effective_modulus
+from mbma_tables.scenes.problem import effects
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import ROUGHNESS
 from mbma_tables.surfaces.self_affine import CASES, PARAMETERS
@@ -245,7 +246,9 @@ def _from_table(surface: Mapping[str, Any], folder: pathlib.Path, title: str) ->
 
 @functools.cache
 def schema() -> dict[str, Any]:
-    """The JSON schema of scene files, as published in the package."""
+    """The JSON schema of scene files, as published in the package, with the names of all quantities as effects."""
     path = pathlib.Path(__file__).with_name("scene.schema.json")
     content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    effects_on = content["properties"]["effects"]["properties"]["on"]
+    effects_on["items"] = {"type": "string", "enum": list(effects())}
     return content

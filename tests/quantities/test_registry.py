@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from generate.quantities import FILE, properties
-from mbma_tables import Bodies, InputError, Joint, Surface, contact, contact_law
+from mbma_tables import Bodies, InputError, Joint, Scene, Surface, contact, contact_law
 from mbma_tables.cli import main
 from mbma_tables.common.errors import MissingError
 from mbma_tables.common.units import (
@@ -321,3 +321,47 @@ def test_commands_show_a_declared_quantity_and_any_that_is_asked_for(
         main, words.replace("energy_depth", "thermal_time").split()
     )
     assert "thermal_time needs conductivity" in failed.output
+
+
+def test_a_scene_computes_a_declared_quantity(thermal_time, tmp_path):
+    """Effects of scenes were a list, and conductivities were refused without the effect solid_conductance."""
+    given = {
+        "surface": FACE,
+        "effects": ["thermal_time", "energy_depth", "mean_pressure", "elastic_hardness"],
+        "pressures": ["10 MPa", "50 MPa"],
+        "E_star": "57.5 GPa",
+        "theory": "calibrated",
+    }
+    metals = ("45 W/(m K)", "167 W/(m K)")
+    found = Scene(**given, conductivities=metals).run()
+    bodies = Bodies("57.5 GPa", conductivity=metals)
+    own = contact(FACE, bodies, pressure=given["pressures"], theory="calibrated")
+    for name in given["effects"]:
+        np.testing.assert_allclose(found[name], own.quantity(name), rtol=1e-12)
+        assert found[name].attrs["units"] == own.units[name]
+    assert "solid_conductance" not in found
+    with pytest.raises(InputError, match="'thermal_time' needs conductivities"):
+        Scene(**given)
+    file = tmp_path / "scene.toml"
+    file.write_text(
+        """
+        theory = "calibrated"
+        [surface]
+        hurst = 0.8
+        q0 = 0.06
+        q1 = 3.0
+        h_rms = 1.0
+        h_max = 3.5
+        length_unit = "um"
+        [material]
+        E_star = "57.5 GPa"
+        [prescribed]
+        pressures = ["10 MPa", "50 MPa"]
+        [effects]
+        on = ["energy_depth"]
+        """
+    )
+    of_file = Scene.from_toml(file).run()
+    np.testing.assert_allclose(of_file["energy_depth"], own.energy_depth, rtol=1e-12)
+    with pytest.raises(InputError, match="did you mean 'energy_depth'"):
+        Scene(**given | {"effects": ["energy_dept"]})

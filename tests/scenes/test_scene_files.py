@@ -9,6 +9,8 @@ import pytest
 from mbma_tables import Scene
 from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.common.files import shipped_file
+from mbma_tables.quantities.registry import registry
+from mbma_tables.scenes import problem
 from mbma_tables.scenes.plan import Row, read_costs, shipped_costs
 from mbma_tables.scenes.problem import OUTPUTS, REFINEMENTS
 from mbma_tables.scenes.specimen import schema
@@ -135,7 +137,11 @@ def test_examples_are_scenes_and_the_schema_names_what_the_code_knows():
     assert len(plans) == 3
     assert all(text.startswith("Scene  (rtol=") for text in plans)
     tables = schema()["properties"]
-    assert set(tables["effects"]["properties"]["on"]["items"]["enum"]) == set(OUTPUTS)
+    items = tables["effects"]["properties"]["on"]["items"]
+    assert set(items["enum"]) == {*OUTPUTS, *registry()}
+    path = pathlib.Path(problem.__file__).with_name("scene.schema.json")
+    published = json.loads(path.read_text())["properties"]["effects"]["properties"]["on"]
+    assert set(published["items"]["anyOf"][0]["enum"]) == set(OUTPUTS)
     assert tuple(tables["effects"]["properties"]["off"]["items"]["enum"]) == REFINEMENTS
     json.dumps(schema(), allow_nan=False)
 
