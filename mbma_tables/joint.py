@@ -417,13 +417,17 @@ class Joint(JointQuantities, Displayed):
         self.require_one("a law")
         return law_of(self.surface, self.bodies, self.theory, None, self.interface)
 
-    def sensitivity(self, pressure: float | str) -> Sensitivity:
+    def sensitivity(
+        self, pressure: float | str, quantities: Sequence[str] | None = None
+    ) -> Sensitivity:
         """d ln(result)/d ln(number) at a pressure, for the numbers that the joint was described by.
 
         Parameters
         ----------
         pressure : float or str
             F/A0, held fixed; plain numbers in the unit of the modulus.
+        quantities : sequence of str, optional
+            As for `sensitivity`; by default with the conductances of the joint.
 
         Returns
         -------
@@ -445,7 +449,7 @@ class Joint(JointQuantities, Displayed):
         >>> metal = "copper C11000 hard"
         >>> joint = Joint(face, bodies=metal, nominal_area="4 cm^2", theory="calibrated")
         >>> slopes = joint.sensitivity("10 MPa").slopes
-        >>> f"conductance goes like Rq^{slopes['part_a.Rq']['conductance']:.2f}"
+        >>> f"conductance goes like Rq^{slopes['part_a.Rq']['solid_conductance']:.2f}"
         'conductance goes like Rq^-0.67'
         """
         self.require_one("a sensitivity")
@@ -455,12 +459,13 @@ class Joint(JointQuantities, Displayed):
         return relative_derivatives(
             self._unknowns(chosen),
             chosen,
-            in_units.units,
+            in_units,
             moduli=moduli,
             modulus_of=modulus_of,
             by="pressure",
             value=in_units.units.number("pressure", pressure),
-            hardness=in_units.hardness,
+            quantities=quantities,
+            interface=self.interface,
         )
 
     def _moduli(

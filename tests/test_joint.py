@@ -159,7 +159,7 @@ def pressed_again(factors, theory, unit, size, answers):
 @pytest.mark.slow
 def test_sensitivities_are_differences_of_joints_described_anew(theory, unit, size):
     """Each row holds for the number that was typed, all others and the pressure unchanged."""
-    answers = ("mean_separation", "area", "stiffness", "conductance")
+    answers = ("mean_separation", "area", "stiffness", "solid_conductance")
     joint = pressed_again({}, theory, unit, size, ())
     slopes = joint.sensitivity("50 MPa").slopes
     assert set(slopes) == set(ROWS)

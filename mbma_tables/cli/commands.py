@@ -175,13 +175,20 @@ def curve_command(
 
 @click.command("sensitivity", short_help="Sensitivity of results to each parameter.")
 @options.load_options(options.quantity_option)
+@options.results_option
+@options.conductivity_option
 @options.specimen_options
 @options.theory_options
 @options.json_option("a table")
 def sensitivity_command(
-    loads: dict[str, Any], specimen: Specimen, model: options.Model, as_json: bool
+    loads: dict[str, Any],
+    quantity: list[str] | None,
+    conductivity: list[float | str] | None,
+    specimen: Specimen,
+    model: options.Model,
+    as_json: bool,
 ) -> None:
-    """d ln(result)/d ln(parameter) of force, area, stiffness and conductance, the given quantity held fixed.
+    """d ln(result)/d ln(parameter) of force, area, stiffness and others, the given quantity held fixed.
 
     Parameters are the surface's five numbers, or those of a drawing; of a map or a spectrum
     the scales of its heights and lengths; of a spectrum also h_max, cut-offs and the
@@ -196,8 +203,9 @@ def sensitivity_command(
     model = model.of(specimen.surface, name_of_the_given(given))
     found = sensitivity(
         specimen.surface,
-        model.bodies(specimen),
+        model.bodies(specimen, conductivity),
         theory=model.theory,
+        quantities=quantity,
         **loads,
     )
     units = {

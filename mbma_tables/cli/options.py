@@ -515,6 +515,12 @@ columns_option = click.option(
     callback=_names,
     help="Add columns of further quantities: mean_pressure, hydraulic_aperture, ...",
 )
+results_option = click.option(
+    "--quantity",
+    metavar="NAME[,NAME]",
+    callback=_names,
+    help="Quantities of the contact; else those that tables show, with a model uncertainty.",
+)
 conductivity_option = numbers_option(
     "--conductivity",
     help="Of both bodies, or of each: adds conductance. In W/(m^2 K) of '45 W/(m K)'.",

@@ -6,17 +6,19 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.bodies import Bodies
+from mbma_tables.bodies import Bodies, BodiesInUnits
 from mbma_tables.common.arguments import FloatArray, hinted, one_number
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.units import DIMENSIONS, Dimension, Units, factor
-from mbma_tables.contacts.contact import contact
-from mbma_tables.contacts.question import Question
+from mbma_tables.common.units import DIMENSIONS, Units, factor
+from mbma_tables.contacts.contact import contact_of
+from mbma_tables.contacts.question import GAPS, Question
+from mbma_tables.quantities import registry
+from mbma_tables.quantities.interface import NOTHING_BETWEEN, Interface
 from mbma_tables.quantities.registry import unit_of
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights
@@ -27,21 +29,17 @@ from mbma_tables.theories import resolve
 from mbma_tables.theories.base import Theory, UserTheory
 from mbma_tables.theories.calibrated.theory import Calibrated
 
+if TYPE_CHECKING:
+    from mbma_tables.contacts.result import Contact
+
 STEP = 0.02  # step of the logarithm of a parameter
 NEAR = 0.9  # share of a parameter's upper limit above which its steps go down
 MAX_ERROR = 0.05  # largest error of a slope, over itself or 1; else it is NaN
-# of a conductance over the mean conductivity of the bodies
-PER_CONDUCTIVITY = Dimension(length=-1)
-ANSWERS = ("mean_separation", "pressure", "area", "stiffness", "conductance")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """Result of `sensitivity`; its text is a table.
-
-    Stiffness is that of loading, conductance that over the mean conductivity of the bodies
-    [1/length].
-    """
+    """Result of `sensitivity`; its text is a table."""
 
     by: str  #: quantity held fixed: "separation", "mean_separation", "pressure" or "area"
     parameters: dict[
@@ -52,12 +50,13 @@ class Sensitivity:
     #: where the result jumps
     slopes: dict[str, dict[str, float]]
     errors: dict[str, dict[str, float]]  #: estimates of their errors
-    units: Units  #: of parameters and results
+    units: Units  #: of parameters
+    answer_units: dict[str, str]  #: the unit of each result
 
     def unit(self, name: str) -> str:
         """The unit of a parameter or of a result."""
-        if name == "conductance":
-            return PER_CONDUCTIVITY.unit(self.units)
+        if name in self.answer_units:
+            return self.answer_units[name]
         return unit_of(name.rpartition(".")[2], self.units)
 
     def __str__(self) -> str:
@@ -66,10 +65,11 @@ class Sensitivity:
             f"d ln(answer)/d ln(parameter) at given {self.by}",
             f"{'':{width}}{'value':>22}",
         ]
-        lines[1] += "".join(f"{name:>17}" for name in self.answers)
+        widths = {name: max(17, len(name) + 2) for name in self.answers}
+        lines[1] += "".join(f"{name:>{widths[name]}}" for name in self.answers)
         for name, value in self.parameters.items():
             slopes = "".join(
-                f"{round(self.slopes[name][answer], 3) + 0.0:>17.3f}"
+                f"{round(self.slopes[name][answer], 3) + 0.0:>{widths[answer]}.3f}"
                 for answer in self.answers
             )
             unit = self.unit(name)
@@ -88,8 +88,9 @@ def sensitivity(
     pressure: ArrayLike | None = None,
     area: ArrayLike | None = None,
     theory: str | Theory | UserTheory | None = None,
+    quantities: Sequence[str] | None = None,
 ) -> Sensitivity:
-    """Sensitivity of pressure, area, stiffness and conductance to each parameter of a surface, for any theory.
+    """Sensitivity of quantities of a contact to each parameter of a surface, for any theory.
 
     Parameters
     ----------
@@ -109,6 +110,10 @@ def sensitivity(
     theory : str or theory, optional
         As for `contact`, with the same default. The simulation of a map answers for its
         heights and lengths by similarity, without a hardness.
+    quantities : sequence of str, optional
+        Names of quantities of a contact, in whose units they are. Default: those with a
+        model uncertainty that tables show of the contact, such as pressure, area, stiffness
+        and, of bodies with a conductivity, `solid_conductance`.
 
     Returns
     -------
@@ -117,8 +122,8 @@ def sensitivity(
     Raises
     ------
     InputError, OutOfRangeError
-        For a batch, unknown names, where there is no contact, and for the simulation of a
-        map with a hardness.
+        For a batch, unknown names, quantities that need what was not given or are not
+        positive, where there is no contact, and for the simulation of a map with a hardness.
 
     Examples
     --------
@@ -128,7 +133,7 @@ def sensitivity(
     >>> print(f"area goes like Rdq^{found.slopes['Rdq']['area']:.2f}")
     area goes like Rdq^-1.15
     >>> found = sensitivity(ground, "steel 1020", pressure="10 MPa", theory="calibrated")
-    >>> f"conductance goes like hardness^{found.slopes['hardness']['conductance']:.2f}"
+    >>> f"conductance goes like hardness^{found.slopes['hardness']['solid_conductance']:.2f}"
     'conductance goes like hardness^-0.68'
     """
     in_units = Bodies.of(bodies).in_units(surface)
@@ -143,12 +148,12 @@ def sensitivity(
     return relative_derivatives(
         unknowns_of(surface, chosen),
         chosen,
-        in_units.units,
+        in_units,
         moduli={"E_star": in_units.E_star},
         modulus_of=_itself,
         by=question.name,
         value=question.value,
-        hardness=in_units.hardness,
+        quantities=quantities,
     )
 
 
@@ -169,25 +174,15 @@ class Unknowns:
     labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     def answers(
-        self,
-        numbers: Mapping[str, Any],
-        by: str,
-        value: Any,
-        modulus: Any,
-        cap: Any,
-        theory: Theory,
+        self, numbers: Mapping[str, Any], asked: Asked, names: Sequence[str]
     ) -> dict[str, Any]:
-        """`ANSWERS` of the surface of these numbers."""
-        pressed: Any = contact(
-            self.make(**numbers),
-            Bodies(modulus, hardness=cap),
-            **{by: value},
-            theory=theory,
-        )
-        answers = {
-            name: getattr(pressed, name) for name in ANSWERS if name != "conductance"
-        }
-        return answers | {"conductance": pressed.unloading_stiffness / modulus}
+        """Quantities of the contact of the surface of these numbers."""
+        pressed = asked.contact(self.make(**numbers))
+        return {name: pressed.quantity(name) for name in names}
+
+    def knows(self, name: str) -> bool:
+        """Whether a quantity follows for other numbers."""
+        return True
 
 
 class OfOneMap(Unknowns):
@@ -197,42 +192,110 @@ class OfOneMap(Unknowns):
     bodies of modulus E* a/l, at gaps 1/a times as large.
     """
 
+    #: powers of `a` and `l` by which a quantity is larger than in the contact of the map
+    powers: ClassVar[Mapping[str, tuple[int, int]]] = {
+        "mean_separation": (1, 0),
+        "separation": (1, 0),
+        "pressure": (0, 0),
+        "mean_pressure": (0, 0),
+        "area": (0, 0),
+        "stiffness": (-1, 0),
+        "unloading_stiffness": (-1, 0),
+        "tangential_stiffness": (-1, 0),
+        "energy": (1, 0),
+        "solid_conductance": (0, -1),
+    }
+
     def answers(
-        self,
-        numbers: Mapping[str, Any],
-        by: str,
-        value: Any,
-        modulus: Any,
-        cap: Any,
-        theory: Theory,
+        self, numbers: Mapping[str, Any], asked: Asked, names: Sequence[str]
     ) -> dict[str, Any]:
-        """`ANSWERS` of the map with these factors."""
+        """Quantities of the contact of the map with these factors."""
         heights = numbers["heights"]
         lengths = numbers["lengths"]
-        equal_modulus = modulus * heights / lengths
-        scale = {"pressure": equal_modulus, "area": 1.0}.get(by, heights)
-        pressed: Any = contact(self.make(), **{by: value / scale}, theory=theory)
-        return {
-            "mean_separation": heights * pressed.mean_separation,
-            "pressure": equal_modulus * pressed.pressure,
-            "area": pressed.area,
-            "stiffness": equal_modulus / heights * pressed.stiffness,
-            "conductance": equal_modulus
-            / (heights * modulus)
-            * pressed.unloading_stiffness,
-        }
+        equal_modulus = asked.bodies.E_star * heights / lengths
+        scale = heights ** self.powers[asked.by][0]
+        equal = dataclasses.replace(
+            asked,
+            bodies=dataclasses.replace(asked.bodies, E_star=equal_modulus),
+            value=asked.value / scale,
+        )
+        pressed = equal.contact(self.make())
+        answers = {}
+        for name in names:
+            of_heights, of_lengths = self.powers[name]
+            factors = heights**of_heights * lengths**of_lengths
+            answers[name] = factors * pressed.quantity(name)
+        return answers
+
+    def knows(self, name: str) -> bool:
+        """Whether a quantity follows by similarity."""
+        return name in self.powers
+
+
+@dataclasses.dataclass(frozen=True)
+class Asked:
+    """A contact at one given quantity, but for its surface."""
+
+    bodies: BodiesInUnits
+    by: str
+    value: Any
+    theory: Theory
+    interface: Interface
+
+    def contact(self, surface: AnySurface) -> Contact:
+        """The contact of a surface."""
+        candidates = dict.fromkeys((*GAPS, "pressure", "area"))
+        return contact_of(
+            surface,
+            self.bodies,
+            candidates | {self.by: self.value},
+            self.theory,
+            self.interface,
+        )
+
+
+def _names(
+    pressed: Contact, quantities: Sequence[str] | None, unknowns: Unknowns, by: str
+) -> list[str]:
+    """Names of the quantities whose derivatives are asked for, or that have them by default."""
+    # one separation gives the other
+    same = "mean_separation" if by == "separation" else by
+    if quantities is None:
+        is_open = bool(np.all(pressed.area == 0))
+        return [
+            name
+            for name in registry.results()
+            if name != same
+            and registry.get(name).is_shown(pressed)
+            and unknowns.knows(name)
+            # a vacuum conducts nothing
+            and (is_open or np.all(pressed.quantity(name) > 0))
+        ]
+    if isinstance(quantities, str) or not quantities:
+        raise InputError(f"quantities are a list of names, got {quantities!r}")
+    for name in quantities:
+        registry.get(name)
+        if not unknowns.knows(name):
+            raise InputError(
+                f"{name} of a simulated map does not follow from its simulation for other "
+                "heights and lengths: give theory='calibrated'"
+            )
+        if name == by:
+            raise InputError(f"{name} is held fixed: leave it out of quantities")
+    return list(dict.fromkeys(quantities))
 
 
 def relative_derivatives(
     unknowns: Unknowns,
     theory: Theory,
-    units: Units,
+    bodies: BodiesInUnits,
     *,
     moduli: Mapping[str, Any],
     modulus_of: Callable[..., Any],
     by: str,
     value: Any,
-    hardness: Any,
+    quantities: Sequence[str] | None = None,
+    interface: Interface = NOTHING_BETWEEN,
 ) -> Sensitivity:
     """d ln(answer)/d ln(number) for the numbers of a surface, the moduli, the quantity held fixed and the hardness.
 
@@ -241,19 +304,23 @@ def relative_derivatives(
     unknowns : Unknowns
         Of the surface.
     theory : Theory
-    units : Units
-        Of all numbers.
+    bodies : BodiesInUnits
+        In the units of all numbers.
     moduli : mapping
         Of the bodies, by name.
     modulus_of : callable
         E* of these moduli, in their order.
     by, value : str, float
         The quantity held fixed.
-    hardness : float
-        Of the softer body, infinite where nothing yields.
+    quantities : sequence of str, optional
+        Whose derivatives they are, as of `sensitivity`.
+    interface : Interface, optional
+        What is between the bodies.
     """
     from scipy.differentiate import jacobian
 
+    units = bodies.units
+    hardness = bodies.hardness
     yields = not np.equal(hardness, np.inf).all()
     if yields and isinstance(unknowns, OfOneMap):
         raise InputError(
@@ -269,17 +336,23 @@ def relative_derivatives(
     varied = [
         name for name, number in numbers.items() if number != 0 and name not in fixed
     ]
-    same = "mean_separation" if by == "separation" else by
-    wanted = [name for name in ANSWERS if name != same]
+    here_asked = Asked(bodies, by, numbers[by], theory, interface)
+    pressed = here_asked.contact(unknowns.make(**unknowns.numbers))
+    wanted = _names(pressed, quantities, unknowns, by)
 
     def logarithms_of(given: dict[str, Any]) -> FloatArray:
         """Of the answers wanted, for numbers or arrays of them."""
-        modulus = modulus_of(*(given[name] for name in moduli))
-        own = {name: given[name] for name in unknowns.numbers}
-        answers = unknowns.answers(
-            own, by, given[by], modulus, given.get("hardness", np.inf), theory
+        moved = dataclasses.replace(
+            bodies,
+            E_star=modulus_of(*(given[name] for name in moduli)),
+            hardness=given.get("hardness", np.inf),
         )
-        return np.log([answers[name] for name in wanted])
+        asked = dataclasses.replace(here_asked, bodies=moved, value=given[by])
+        own = {name: given[name] for name in unknowns.numbers}
+        answers = unknowns.answers(own, asked, wanted)
+        # some do not depend on the gap, such as the plasticity index
+        shape = np.broadcast_shapes(*map(np.shape, given.values()))
+        return np.log([np.broadcast_to(answers[name], shape) for name in wanted])
 
     @np.errstate(all="ignore")
     def logarithms(x: FloatArray) -> FloatArray:
@@ -301,8 +374,9 @@ def relative_derivatives(
 
     here = np.exp(logarithms(np.zeros((len(varied), 1))))[:, 0]
     if not (here > 0).all():
+        none = ", ".join(np.array(wanted)[~(here > 0)])
         raise InputError(
-            f"there is no contact at this {by}, or full contact: logarithmic derivatives do not exist"
+            f"there is no contact at this {by}, or full contact: logarithmic derivatives do not exist, of {none}"
         )
     with np.errstate(all="ignore"):
         derivative = jacobian(
@@ -324,6 +398,7 @@ def relative_derivatives(
         _by_name(labels, wanted, slopes),
         _by_name(labels, wanted, derivative.error),
         units,
+        {name: registry.get(name).unit(pressed) for name in wanted},
     )
 
 
@@ -383,7 +458,7 @@ def unknowns_of(
         from mbma_tables.theories import BoundaryElements
 
         if isinstance(theory, BoundaryElements):
-            return OfOneMap({"heights": 1.0, "lengths": 1.0}, lambda: moved)
+            return OfOneMap({"heights": 1.0, "lengths": 1.0}, lambda **factors: moved)
     return _of_spectrum(moved, theory)
 
 

@@ -143,14 +143,15 @@ SLOW = [
 @pytest.mark.parametrize("theory", SLOW)
 @pytest.mark.parametrize("by", HELD)
 def test_answers_scale_as_they_must(theory, by):
-    found = sensitivity_of(SURFACE, "10 GPa", **{by: HELD[by]}, theory=theory)
+    bodies = Bodies("10 GPa", conductivity="45 W/(m K)")
+    found = sensitivity_of(SURFACE, bodies, **{by: HELD[by]}, theory=theory)
     powers = {
         "mean_separation": (1, 0),
         "pressure": (0, 1),
         "area": (0, 0),
         "stiffness": (-1, 1),
     }
-    powers |= {"conductance": (-1, 0)}
+    powers |= {"solid_conductance": (-1, 0)}
     assert set(found.answers) == set(powers) - {by}
     for answer in found.answers:
         slope = {name: row[answer] for name, row in found.slopes.items()}
@@ -194,6 +195,11 @@ def test_numbers_of_a_drawing_are_the_unknowns():
 test_what_is_refused = refusals(
     lambda changed: sensitivity_of(**({"surface": SURFACE, "bodies": 10.0} | changed)),
     ({}, "give exactly one of separation"),
+    ({"pressure": 0.1, "quantities": ["aera"]}, "did you mean 'area'"),
+    ({"pressure": 0.1, "quantities": "area"}, "quantities are a list of names"),
+    ({"pressure": 0.1, "quantities": ["pressure"]}, "pressure is held fixed"),
+    ({"pressure": 0.1, "quantities": ["total_conductance"]}, "needs conductivity"),
+    ({"area": 0.3, "quantities": ["separation"]}, "do not exist, of separation"),
     ({"pressure": 0.1, "area": 0.1}, "got pressure and area"),
     ({"separation": 2.0}, "there is no contact at this separation"),
     ({"pressure": [0.1, 0.2]}, "pressure must be one number"),
@@ -292,7 +298,8 @@ def test_a_map_answers_by_the_theory_that_contact_takes():
     heights = 0.1 * random_map(64, 0.03, 0.2, power=0)
     step = 0.01
     surface = Surface.from_map(heights, 1.0, periodic=True, unit="um")
-    slopes = sensitivity(surface, "30 GPa", pressure="0.1 GPa", theory="simulated").slopes
+    bodies = Bodies("30 GPa", conductivity="45 W/(m K)")
+    slopes = sensitivity(surface, bodies, pressure="0.1 GPa", theory="simulated").slopes
     rows = {
         "heights": [simulated_anew(heights * (1 + sign * step), 1.0) for sign in (1, -1)],
         "lengths": [simulated_anew(heights, 1 + sign * step) for sign in (1, -1)],
@@ -308,7 +315,7 @@ def test_a_map_answers_by_the_theory_that_contact_takes():
     for name, (up, down) in rows.items():
         known = [
             slopes[name][answer]
-            for answer in ("mean_separation", "area", "stiffness", "conductance")
+            for answer in ("mean_separation", "area", "stiffness", "solid_conductance")
         ]
         differences_by_hand = (up - down) / np.log((1 + step) / (1 - step))
         np.testing.assert_allclose(known, differences_by_hand, atol=0.01, err_msg=name)

@@ -8,7 +8,16 @@ import pytest
 from click.testing import CliRunner
 
 from generate.quantities import FILE, properties
-from mbma_tables import Bodies, InputError, Joint, Scene, Surface, contact, contact_law
+from mbma_tables import (
+    Bodies,
+    InputError,
+    Joint,
+    Scene,
+    Surface,
+    contact,
+    contact_law,
+    sensitivity,
+)
 from mbma_tables.cli import main
 from mbma_tables.common.errors import MissingError
 from mbma_tables.common.units import (
@@ -365,3 +374,42 @@ def test_a_scene_computes_a_declared_quantity(thermal_time, tmp_path):
     np.testing.assert_allclose(of_file["energy_depth"], own.energy_depth, rtol=1e-12)
     with pytest.raises(InputError, match="did you mean 'energy_depth'"):
         Scene(**given | {"effects": ["energy_dept"]})
+
+
+def test_a_declared_quantity_has_sensitivities(thermal_time):
+    """Sensitivities had a list, whose conductance was that over the conductivity."""
+    bodies = Bodies("57.5 GPa", conductivity="45 W/(m K)")
+    given = {"pressure": "10 MPa", "theory": "calibrated"}
+    found = sensitivity(FACE, bodies, **given)
+    pressed = contact(FACE, bodies, **given)
+    assert found.answers["thermal_time"] == pytest.approx(pressed.thermal_time, 1e-12)
+    assert found.unit("thermal_time") == "s"
+    for row in found.slopes.values():
+        assert row["thermal_time"] == pytest.approx(-row["solid_conductance"], abs=1e-9)
+    asked = sensitivity(FACE, bodies, **given, quantities=["energy_depth", "scatter"])
+    assert set(asked.answers) == {"energy_depth", "scatter"}
+    up, down = (
+        contact(FACE, bodies, pressure=f"{10 * factor} MPa", theory="calibrated")
+        for factor in (1.001, 1 / 1.001)
+    )
+    slope = np.log(up.energy_depth / down.energy_depth) / (2 * np.log(1.001))
+    assert asked.slopes["pressure"]["energy_depth"] == pytest.approx(slope, abs=1e-4)
+    with pytest.raises(InputError, match="thermal_time needs conductivity"):
+        sensitivity(FACE, "57.5 GPa", **given, quantities=["thermal_time"])
+    joint = Joint(FACE, bodies=METALS, theory="calibrated")
+    answers = joint.sensitivity("10 MPa").answers
+    assert {"total_conductance", "gas_conductance", "thermal_time"} <= set(answers)
+    own = joint.at_pressure("10 MPa").total_conductance
+    assert answers["total_conductance"] == pytest.approx(own, rel=1e-12)
+
+
+def test_pictures_have_a_declared_quantity(thermal_time):
+    """Pictures of contacts and joints had lists."""
+    pressures = np.geomspace(1, 50, 7)
+    joint = Joint(FACE, bodies=METALS, theory="calibrated")
+    pressed = contact(
+        FACE, METALS, pressure=[f"{p} MPa" for p in pressures], theory="calibrated"
+    )
+    for figure in (joint.plot(pressures=("1 MPa", "50 MPa")), pressed.plot()):
+        labels = [axes.get_ylabel() for axes in figure.axes]
+        assert any("time [s]" in label for label in labels), labels
