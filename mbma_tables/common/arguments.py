@@ -165,13 +165,21 @@ def require_flag(name: str, value: Any) -> None:
         raise InputError(f"{name} must be True or False, got {value!r}")
 
 
+# of pyproject.toml, by the package that a user may lack
+EXTRAS = {"SurfaceTopography": "maps", "matplotlib": "plot", "pyarrow": "parquet"}
+
+
 def needed(module: str) -> Any:
     """A module of another package; if it is missing, the error has the command that installs it."""
     try:
         return importlib.import_module(module)
     except ImportError:
         package = module.partition(".")[0]
-        raise MbmaError(f"this needs {package}: pip install {package}") from None
+        extra = EXTRAS.get(package)
+        or_extra = f", or the extra '{extra}' of mbma_tables" if extra else ""
+        raise MbmaError(
+            f"this needs {package}: pip install {package}{or_extra}"
+        ) from None
 
 
 def is_labelled(value: Any) -> bool:
