@@ -154,18 +154,16 @@ def command(out: pathlib.Path | None) -> None:
             f"{U:7.3f}   {s.eccentricity:.4f}         {thinnest}            {s.friction:.4f}"
         )
     if out is not None:
-        figure = Figure(figsize=(6, 4), layout="constrained")
-        axes = figure.subplots()
-        axes.loglog(SPEEDS, [s.friction for s in states], label="coefficient of friction")
-        axes.loglog(
-            SPEEDS,
-            [max(s.in_contact, 1e-4) for s in states],
-            "--",
-            label="share of the load on contacts",
-        )
-        axes.set(xlabel="sliding speed [m/s]", ylim=(3e-4, 2))
-        axes.grid(True, alpha=0.3)
-        axes.legend()
+        figure = Figure(figsize=(6, 6), layout="constrained")
+        above, below = figure.subplots(2, 1, sharex=True)
+        above.loglog(SPEEDS, [s.friction for s in states], "o-", ms=4)
+        above.set(ylabel="coefficient of friction", ylim=(5e-4, 0.3))
+        below.semilogx(SPEEDS, [100 * s.in_contact for s in states], "C1o-", ms=4)
+        below.set(xlabel="sliding speed [m/s]", ylabel="load on contacts [%]")
+        for axes in (above, below):
+            axes.xaxis.set_major_formatter("{x:g}")
+            axes.grid(True, alpha=0.3)
+        above.yaxis.set_major_formatter("{x:g}")
         out.write_bytes(to_picture(figure, out.suffix[1:], outlines=True))
 
 

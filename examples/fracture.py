@@ -104,15 +104,16 @@ def command(out: pathlib.Path | None) -> None:
     if out is not None:
         figure = Figure(figsize=(6, 4), layout="constrained")
         axes = figure.subplots()
-        rows = table.x > 0
+        # where the uncertainty was computed
+        rows = (table.x >= STRESSES[0]) & (table.x <= STRESSES[-1])
         p = table.x[rows] / 1e6
-        k = table.y[rows] ** 2 / 12
-        axes.loglog(p, k, label="w^2/12")
-        axes.loglog(
+        k = 1e9 * table.y[rows] ** 2 / 12
+        axes.semilogx(p, k, label="fracture, w²/12")
+        axes.semilogx(
             p,
-            table.more["aperture"][0][rows] ** 2 / 12,
+            1e9 * table.more["aperture"][0][rows] ** 2 / 12,
             "--",
-            label="u^2/12, of parallel faces at the mean gap",
+            label="parallel faces at the same mean gap, u²/12",
         )
         band = np.interp(p, STRESSES / 1e6, scatter)
         axes.fill_between(
@@ -122,7 +123,14 @@ def command(out: pathlib.Path | None) -> None:
             alpha=0.2,
             label="one standard deviation",
         )
-        axes.set(xlabel="effective normal stress [MPa]", ylabel="permeability [m^2]")
+        axes.set(
+            xlabel="effective normal stress [MPa]",
+            ylabel="permeability [10⁻⁹ m²]",
+            xticks=STRESSES / 1e6,
+            ylim=(0, None),
+        )
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.minorticks_off()
         axes.grid(True, alpha=0.3)
         axes.legend()
         out.write_bytes(to_picture(figure, out.suffix[1:], outlines=True))

@@ -305,7 +305,7 @@ def maps() -> Measured:
 
 
 def draw_families() -> Figure:
-    figure, axes = panels(2, 7, (14, 4.4))
+    figure, axes = panels(2, 7, (14, 5))
     for axis, family in itertools.zip_longest(axes.ravel(), makers.FAMILIES):
         axis.set_axis_off()
         if not family:
@@ -313,7 +313,9 @@ def draw_families() -> Figure:
         z = makers.heights(makers.Part(family, 1))
         # every fourth point is enough for a small picture
         axis.imshow(z[::4, ::4].T, origin="lower", interpolation="none")
-        axis.set_title(family)
+        side = f"{len(z)} × {len(z)} steps"
+        heights = f"{z.min():.2g} to {z.max():.2g}"
+        axis.set_title(f"{family}\n{side}, {heights}", fontsize="small")
     return figure
 
 

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 import xarray as xr
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
 
 from generate import distances
 from generate.boundary_elements.run import LIGHT_BINS, compared, surfaces
@@ -403,6 +405,14 @@ def _draw_ball() -> Figure:
     return figure
 
 
+# lines of `by_contact` for variants of a theory, thinner than the theory's
+VARIANTS: dict[str, dict[str, Any]] = {
+    "MBMA printed": {"ls": ":", "lw": 1.2},
+    "MBMA fitted": {"ls": "--", "lw": 1.2},
+    "MBMA cover": {"ls": "-.", "lw": 1.2},
+    "calibrated, map": {"ls": "--", "lw": 1.2},
+    "Persson simplified": {"ls": "--", "lw": 1.2},
+}
 BINS = (0.0005, 0.002, 0.005, 0.01, 0.03, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 0.9, 0.98)
 
 
@@ -444,9 +454,9 @@ def by_contact() -> Figure:
         ax.axhline(1, color="k", lw=0.5)
         ax.set(
             xscale="log",
-            xlim=(2e-4, 1.1),
+            xlim=(6e-4, 1.1),
             yscale="log",
-            ylim=(0.1, 10),
+            ylim=(0.04, 25),
             ylabel=f"{quantity}, theory / simulation",
         )
         ax.grid(alpha=0.3)
@@ -475,7 +485,12 @@ def _draw_deviation(
     middle = np.sqrt(np.multiply(BINS[1:], BINS[:-1]))[has_enough]
     mean = mean[has_enough]
     spread = spread[has_enough]
-    ax.plot(middle, np.exp(mean), ".-", color=hue, label=theory)
+    style: dict[str, Any] = {
+        "marker": ".",
+        "color": hue,
+        **VARIANTS.get(theory, {"lw": 2.2}),
+    }
+    ax.plot(middle, np.exp(mean), label=theory, **style)
     if theory in ("MBMA reported", "calibrated"):
         lower = np.exp(mean - spread)
         upper = np.exp(mean + spread)
@@ -503,16 +518,21 @@ def draw_data(tree: xr.DataTree) -> Figure:
             y.values.ravel(),
             ".",
             color=colour,
-            ms=1.5,
+            ms=2.5,
             alpha=0.5,
             rasterized=True,
         )
 
     left.set(xscale="log", yscale="log")
-    for row in range(hard.sizes["hardness"]):
+    hues = colormaps["viridis_r"](np.linspace(0.1, 1, hard.sizes["hardness"]))
+    for row, hue in enumerate(hues):
         of_hardness = hard.isel(hardness=row)
-        grey = str(0.8 - 0.13 * row)
-        dots(left, of_hardness.force, of_hardness.area, grey)
+        dots(left, of_hardness.force, of_hardness.area, to_hex(hue))
+        value = float(of_hardness.eta)
+        # a dot of a size that can be seen, for the legend
+        name = f"{value:g}" if np.isfinite(value) else "elastic"
+        left.plot([], [], "o", ms=4, color=hue, label=name)
+    left.legend(title="hardness/(E* g)", fontsize="x-small", title_fontsize="x-small")
     middle.set(yscale="log")
     dots(middle, elastic.mean_separation, elastic.force, "C0")
     right.set(yscale="log")
