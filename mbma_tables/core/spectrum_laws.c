@@ -12,6 +12,7 @@ enum { ORDER = MBMA_ORDER, CELLS = 85, NODES = 12, FEW_NODES = 4, MOST_STEPS = 1
 #define LOWEST -14.0   /* ln y of the first cell, up to whose end I is linear in ln y, */
 #define HIGHEST 3.0    /* and of the last, above which I is below 1e-350 */
 #define CELL_RATE 5.0  /* cells in 1 of ln y */
+#define SLIGHT 0.1     /* change of y^2 over which four nodes suffice */
 #define TINY 2e-12     /* of the last two coefficients; a panel with larger ones is halved */
 #define NARROWEST 0.02 /* panel */
 #define NOTHING 80.0   /* exp(-80) of the largest part */
@@ -38,18 +39,25 @@ static const double RULE[NODES / 2][2] = {{0.1252334085114689, 0.249147045813402
 
 /* ---- polynomials through Chebyshev nodes of [-1, 1] -------------------------------------------------------------- */
 
-static double angle_of(int j) { return MBMA_PI * (j + 0.5) / (double)ORDER; }
+/* Chebyshev polynomials at their nodes, of which the first are the nodes: a law takes them a thousand times. */
+typedef struct {
+    double at[ORDER][ORDER];
+} chebyshev;
 
-static double node(int j) { return cos(angle_of(j)); }
+static void fill_chebyshev(chebyshev *T) {
+    for (int m = 0; m < ORDER; m++)
+        for (int j = 0; j < ORDER; j++)
+            T->at[m][j] = cos(m * (MBMA_PI * (j + 0.5) / (double)ORDER));
+}
 
 /* Powers from values at the nodes; the last two Chebyshev coefficients estimate the error. */
-static double powers_of(const double value[ORDER], double p[ORDER]) {
+static double powers_of(const chebyshev *T, const double value[ORDER], double p[ORDER]) {
     double before[ORDER] = {0.0}, term[ORDER] = {1.0}, last[2] = {0.0};
     memset(p, 0, ORDER * sizeof *p);
     for (int m = 0; m < ORDER; m++) {
         double c = 0.0;
         for (int j = 0; j < ORDER; j++)
-            c += (m == 0 ? 1.0 : 2.0) / (double)ORDER * cos(m * angle_of(j)) * value[j];
+            c += (m == 0 ? 1.0 : 2.0) / (double)ORDER * T->at[m][j] * value[j];
         last[m % 2] = fabs(c);
         /* the next Chebyshev polynomial is 2 x times this one less the one before */
         for (int j = ORDER - 1; j >= 0; j--) {
@@ -64,15 +72,17 @@ static double powers_of(const double value[ORDER], double p[ORDER]) {
 
 /* ---- inner integrals I(y), times exp(2 y^2) ---------------------------------------------------------------------- */
 
-/* From ln y down to another, by steps over which exp(2 y^2) changes by a factor e^4 at most. */
+/* From ln y down to another, by steps over which exp(2 y^2) changes by a factor e^4 at most; where it hardly changes
+ * between two neighbouring nodes, the rule of few nodes is exact to rounding. */
 static double integrated_down(double from, double to, const double weight[3], double inner) {
-    const int steps = 1 + (int)(0.5 * (exp(2.0 * from) - exp(2.0 * to)));
+    const double change = exp(2.0 * from) - exp(2.0 * to);
+    const int steps = 1 + (int)(0.5 * change), nodes = change < SLIGHT ? FEW_NODES : NODES;
     for (int step = 0; step < steps; step++) {
         const double high = from + (to - from) * step / steps, low = from + (to - from) * (step + 1) / steps;
         const double end = exp(2.0 * low);
         inner *= mbma_exp(2.0 * (end - exp(2.0 * high)));
-        for (int k = 0; k < NODES; k++) {
-            const double *rule = RULE[k / 2], s = 0.5 * (low + high + (high - low) * (k % 2 ? rule[0] : -rule[0]));
+        for (int k = 0; k < nodes; k++) {
+            const double *rule = change < SLIGHT ? FEW[k / 2] : RULE[k / 2], s = 0.5 * (low + high + (high - low) * (k % 2 ? rule[0] : -rule[0]));
             const double y = mbma_exp(s), P = mbma_erf(1.4142135623730951 * y), P2 = P * P, P4 = P2 * P2, P8 = P4 * P4;
             const double slope = weight[0] + 3.0 * weight[1] * P2 + 16.0 * weight[2] * (P8 * P4) * (P2 * P);
             inner += 0.5 * (high - low) * rule[1] * ROOT_8_PI * mbma_exp(2.0 * (end - y * y)) * slope;
@@ -81,16 +91,16 @@ static double integrated_down(double from, double to, const double weight[3], do
     return inner;
 }
 
-static void inner_integral(const double weight[3], double p[CELLS][ORDER]) {
+static void inner_integral(const chebyshev *T, const double weight[3], double p[CELLS][ORDER]) {
     /* what lies above counts for less than exp(-80) of this */
     double at = HIGHEST + 0.05, own = 0.0, value[ORDER];
     for (int cell = CELLS - 1; cell >= 0; cell--) {
         for (int j = 0; j < ORDER; j++) {
-            const double next = LOWEST + (cell + 0.5 * (1.0 + node(j))) / CELL_RATE;
+            const double next = LOWEST + (cell + 0.5 * (1.0 + T->at[1][j])) / CELL_RATE;
             value[j] = own = integrated_down(at, next, weight, own);
             at = next;
         }
-        (void)powers_of(value, p[cell]);
+        (void)powers_of(T, value, p[cell]);
     }
     p[0][1] = -0.5 * ROOT_8_PI / CELL_RATE * weight[0];
     for (int m = 2; m < ORDER; m++)
@@ -100,6 +110,7 @@ static void inner_integral(const double weight[3], double p[CELLS][ORDER]) {
 /* ---- sums over waves --------------------------------------------------------------------------------------------- */
 
 typedef struct {
+    chebyshev T;
     double p[CELLS][ORDER]; /* I of a law's own W */
     size_t count;
     double *log_g, *fall, *share; /* of wavenumbers: ln g(x) and 1/g(x)^2 - 1, in terms of the last one's g(x) */
@@ -130,8 +141,8 @@ static bool fill_panels(const wave_sum *w, double start, double end, mbma_spectr
         do {
             width *= 0.5;
             for (int j = 0; j < ORDER; j++)
-                value[j] = sum_at(w, start + 0.5 * width * (1.0 + node(j)));
-            tail = powers_of(value, law->p[law->panels]);
+                value[j] = sum_at(w, start + 0.5 * width * (1.0 + w->T.at[1][j]));
+            tail = powers_of(&w->T, value, law->p[law->panels]);
         } while (tail > TINY && width > NARROWEST);
         start = end - start > width ? start + width : end;
         law->edge[++law->panels] = start;
@@ -203,9 +214,13 @@ mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constan
                                  mbma_spectrum_law *law) {
     const size_t n = waves->count;
     double mean = 0.0, inverse = 0.0, slope;
-    wave_sum w = {{{0.0}}, n, work, work + n, work + 2 * n};
+    wave_sum w;
     bool good = n > 0 && h_max > 0.0 && waves->gradient > 0.0 && waves->gradient < INFINITY && waves->alpha > 0.0;
     memset(law, 0, sizeof *law);
+    w.count = n;
+    w.log_g = work;
+    w.fall = work + n;
+    w.share = work + 2 * n;
     for (size_t k = 0; k < n && good; k++) {
         const double below = waves->below[k], last = waves->below[n - 1];
         good = below > 0.0 && below <= last && last < 1.0 + 1e-9 && waves->x[k] > 0.0 && waves->x[k] < INFINITY &&
@@ -220,7 +235,8 @@ mbma_status mbma_spectrum_law_of(const mbma_waves *waves, const mbma_law_constan
         return MBMA_INVALID;
     const double narrowness = 1.0 / (mean * inverse), a = c->weight + c->weight_slope * (narrowness - NARROWNESS);
     const double weight[3] = {a, c->cubic, 1.0 - a - c->cubic};
-    inner_integral(weight, w.p);
+    fill_chebyshev(&w.T);
+    inner_integral(&w.T, weight, w.p);
     law->s0 = mbma_min(c->area_s0 + c->area_slope * log(waves->alpha / 10.0), 1.0);
     law->t0 = c->area_t0;
     law->tail = c->tail * (1.0 - narrowness);

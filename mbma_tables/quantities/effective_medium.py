@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.shared import shared_property
+from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.theories.calibrated.formulas import (
     CONSTANTS,
     Constants,
@@ -63,6 +63,12 @@ class FlowConstants:
         )
 
 
+@shared()
+def _rule() -> tuple[FloatArray, FloatArray]:
+    """Gauss's nodes in [-1, 1] and their weights, which take longer to find than the gaps at them."""
+    return np.polynomial.legendre.leggauss(NODES)
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Gaps:
     """Gaps of the endless Gaussian surface by the calibrated law, at a row of loads."""
@@ -80,7 +86,7 @@ class Gaps:
         centre = self.mean / self.spread
         low = np.log(np.maximum(centre - REACH, LOWEST_GAP))
         high = np.log(centre + REACH)
-        node, weight = np.polynomial.legendre.leggauss(NODES)
+        node, weight = _rule()
         half = (high - low)[..., None] / 2
         t = np.exp(low[..., None] + half * (1 + node))
         density = np.exp(-((t - centre[..., None]) ** 2) / 2) + np.exp(
