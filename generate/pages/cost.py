@@ -67,7 +67,8 @@ def groups(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
 
 def draw(costs: pd.DataFrame) -> Figure:
     figure, axes = panels(1, 2, (9, 4.8), sharey=True)
-    rows_by_title = groups(costs)
+    microseconds = 1e6 * costs["cost"] * shipped_costs().seconds
+    rows_by_title = groups(costs.assign(cost=microseconds))
     methods = pd.concat(rows_by_title.values())["method"].unique()
     mark_of_method = dict(zip(methods, MARKS, strict=False))
     handles: dict[str, Line2D] = {}
@@ -77,7 +78,7 @@ def draw(costs: pd.DataFrame) -> Figure:
         (handles["Pareto front"],) = panel.step(
             front["cost"], front["error"], "k-", lw=1, where="post", zorder=0
         )
-        panel.set(xlabel="time / fixed piece of work", title=title)
+        panel.set(xlabel="processor time [µs]", title=title)
         panel.grid(alpha=0.3)
     axes[0].set_ylabel("largest relative error")
     figure.legend(
