@@ -32,17 +32,8 @@ if TYPE_CHECKING:
     from mbma_tables.contacts.result import Contact
 
 DIGITS = 6  # significant digits of a table; JSON and CSV keep all
-# model uncertainties of a contact, with what a line of text calls them
-SCATTER = {
-    "scatter": "ln force at a separation",
-    "area_scatter": "ln area at a force",
-    "stiffness_scatter": "ln stiffness",
-    "unloading_stiffness_scatter": "ln unloading stiffness",
-    "separation_scatter": "u",
-    "total_conductance_scatter": "ln total conductance",
-    "solid_conductance_scatter": "ln solid conductance",
-    "gas_conductance_scatter": "ln gas conductance",
-}
+# how the meaning of a model uncertainty begins
+STATED = "model uncertainty: standard deviation of "
 SURFACE_NUMBERS = (
     "hurst",
     "q0",
@@ -255,14 +246,16 @@ def _scatter(answer: Contact) -> tuple[list[str], dict[str, Any]]:
     """Model uncertainties of a contact, likewise."""
     scatter = {
         name: answer.quantity(name)
-        for name in SCATTER
-        if registry.registry()[name].is_available(answer)
+        for name, declared in registry.registry().items()
+        if declared.meaning.startswith(STATED) and declared.is_shown(answer)
     }
     # of an elastic contact both stiffnesses are one
     listed_names = [
         name for name in scatter if answer.yields or name != "unloading_stiffness_scatter"
     ]
-    meanings = ", ".join(SCATTER[name] for name in listed_names)
+    meanings = ", ".join(
+        registry.get(name).meaning.removeprefix(STATED) for name in listed_names
+    )
     ranges = ", ".join(shown(scatter[name], answer.units[name]) for name in listed_names)
     notes = []
     if any(np.isfinite(values).any() for values in scatter.values()):

@@ -405,9 +405,7 @@ class _Planner:
         outputs = self.problem.outputs
         requirements = {
             "inverse": self.problem.prescribed in INVERTED,
-            # so may other quantities of the registry
-            "slopes": bool(outputs & {"stiffness", "solid_conductance"})
-            or not outputs <= set(OUTPUTS),
+            "slopes": self.problem.needs_slopes,
             "energy": self.problem.computes("energy"),
             "yield": "yield" in outputs,
         }

@@ -323,6 +323,12 @@ class Problem:
         return any(is_made_of(name, effect) for name in self.outputs)
 
     @property
+    def needs_slopes(self) -> bool:
+        """Whether derivatives are computed: of all quantities but pressure, area and energy, as far as is known here."""
+        others = {*of_contact(self.outputs)} - {"pressure", "area", "energy"}
+        return bool(others - {"leakage", "validity", "yield"})
+
+    @property
     def sums_islands(self) -> bool:
         """Whether the scene's theory is MBMA, whose islands and refinements a plan chooses."""
         return bool(self.theory == "mbma")

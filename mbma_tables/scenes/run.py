@@ -147,7 +147,7 @@ def _amplification(run: Run, theory: Any) -> float:
     h_max = float(run.surface.h_max)
     gap = run.gap[run.gap < h_max]
     is_inverted = problem.prescribed in INVERTED
-    needs_slopes = bool(problem.outputs & {"stiffness", "solid_conductance"})
+    needs_slopes = problem.needs_slopes
     if not gap.size or not (needs_slopes or is_inverted):
         return 1.0
     totals = theory.totals(run.surface, gap, slopes=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import json
 import os
 import pathlib
@@ -244,7 +243,6 @@ def _from_table(surface: Mapping[str, Any], folder: pathlib.Path, title: str) ->
     return _from_map(path, treatment, unit)
 
 
-@functools.cache
 def schema() -> dict[str, Any]:
     """The JSON schema of scene files, as published in the package, with the names of all quantities as effects."""
     path = pathlib.Path(__file__).with_name("scene.schema.json")
