@@ -137,7 +137,7 @@ CALLS = {
     "universal": (open_table("universal").answer, {"X": 1.0, "mu": 1.0}),
     "island4d": (
         open_table("island4d").lookup,
-        {"delta_over_h_rms": 1.5, "zeta_d": 2.0, "zeta_u": 20.0, "hurst": 0.7},
+        {"delta": 1.5, "zeta_d": 2.0, "zeta_u": 20.0, "hurst": 0.7},
     ),
     "law by separation": (contact_law(ROUGH, rtol=1e-3).pressure, {"separation": 0.3}),
     "effective_modulus": (

@@ -135,7 +135,7 @@ class Island4dModel:
 
     def lookup(
         self,
-        delta_over_h_rms: ArrayLike,
+        delta: ArrayLike,
         zeta_d: ArrayLike,
         zeta_u: ArrayLike,
         hurst: ArrayLike,
@@ -145,8 +145,9 @@ class Island4dModel:
 
         Parameters
         ----------
-        delta_over_h_rms : array_like
-            Approach of the island; with h_rms that for infinite zeta_1, Delta + zeta_d^(-H).
+        delta : array_like
+            delta/h_rms, the approach of the island; h_rms is that for infinite zeta_1,
+            so that it is Delta + zeta_d^(-H).
         zeta_d, zeta_u : array_like
             Magnifications of Eqs. (27) and (30), 1 < zeta_d < zeta_u.
         hurst : array_like
@@ -155,18 +156,18 @@ class Island4dModel:
             For islands that the table does not cover: an error, the exact solver, or NaN.
         """
         check_outside(outside)
-        one = self._one(delta_over_h_rms, zeta_d, zeta_u, hurst)
+        one = self._one(delta, zeta_d, zeta_u, hurst)
         if one is not None:
             return Lookup._make(map(np.float64, one))
         named = {
-            "delta_over_h_rms": delta_over_h_rms,
+            "delta": delta,
             "zeta_d": zeta_d,
             "zeta_u": zeta_u,
             "hurst": hurst,
         }
         given = {name: finite_array(name, value) for name, value in named.items()}
         shape = broadcast_shape(**given)
-        delta, low, high, H = (
+        approach, low, high, H = (
             np.ascontiguousarray(np.broadcast_to(array, shape))
             for array in given.values()
         )
@@ -176,7 +177,9 @@ class Island4dModel:
         else:
             self._refuse_ends(H, low)
         require("zeta_u", high, high > low, "above zeta_d")
-        place = to_axes(delta.ravel(), low.ravel(), high.ravel(), H.ravel(), self.variant)
+        place = to_axes(
+            approach.ravel(), low.ravel(), high.ravel(), H.ravel(), self.variant
+        )
         phi_F, phi_A, error = self._answer(place, outside, shape)
         return Lookup(
             *(
