@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import netCDF4
 
-from mbma_tables.common.arguments import needed
 from mbma_tables.common.errors import TableFileError
 from mbma_tables.common.netcdf import HDF5_LOCK, read_sealed
 
@@ -20,7 +19,8 @@ FILE = pathlib.Path(__file__).parents[1] / "docs" / "data" / "boundary_elements.
 
 def read_groups(path: pathlib.Path) -> dict[str, Any]:
     """The groups of a file with a checksum as `xarray.Dataset`, its root as "/"."""
-    xarray = needed("xarray")
+    import xarray
+
     read_sealed(path)
     with HDF5_LOCK:
         with netCDF4.Dataset(path) as opened:
@@ -52,8 +52,6 @@ def boundary_elements(path: os.PathLike[str] | str | None = None) -> xr.DataTree
     ------
     TableFileError
         If there is no such file, or it is damaged.
-    MbmaError
-        Without xarray, which the extra ``xarray`` installs.
 
     Examples
     --------
@@ -68,5 +66,6 @@ def boundary_elements(path: os.PathLike[str] | str | None = None) -> xr.DataTree
             f"{source} does not exist: wheels do not contain the BEM data set; "
             "give the path of docs/data/boundary_elements.nc in a clone or the source distribution of mbma_tables"
         )
-    tree: xr.DataTree = needed("xarray").DataTree.from_dict(read_groups(source))
-    return tree
+    import xarray
+
+    return xarray.DataTree.from_dict(read_groups(source))

@@ -11,8 +11,6 @@ from helpers import refusals
 from mbma_tables import (
     InputError,
     Joint,
-    MbmaError,
-    Scene,
     Surface,
     contact,
     contact_law,
@@ -164,16 +162,6 @@ def test_the_name_of_a_default_is_that_of_its_answers():
         Joint(surface, bodies="steel 4140 hard", theory="persson"),
     ):
         assert other.facts()["theory"] == other.at_pressure("1 MPa").theory
-
-
-def test_without_xarray_the_extra_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "xarray", None)
-    for ask in (
-        ROAD.to_dataset,
-        Scene(ROAD, separations=[0.5], effects=["pressure"]).run,
-    ):
-        with pytest.raises(MbmaError, match=r"this needs xarray: pip install xarray"):
-            ask()
 
 
 def test_a_figure_is_none_of_pyplots_and_kept(thing, tmp_path):

@@ -325,6 +325,18 @@ def test_the_mean_gap_of_a_nominal_one_is_its_integral():
         )
 
 
+def test_the_packages_of_tables_come_without_an_extra():
+    """A lookup's Dataset and a formula asked for extras that nobody had named."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))[
+        "project"
+    ]
+    names = {re.match(r"[\w-]+", line)[0] for line in project["dependencies"]}
+    assert {"numpy", "scipy", "xarray", "netCDF4", "scikit-learn"} <= names
+    extras = project["optional-dependencies"]
+    assert {"maps", "plot", "simulate", "full"} <= set(extras)
+    assert names.isdisjoint(extras)
+
+
 def test_errors_name_the_extra_that_has_a_missing_package(monkeypatch):
     """README's block of a map failed with the name of a package that README does not have."""
     content = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))

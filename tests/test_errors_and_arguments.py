@@ -268,7 +268,7 @@ test_natural_mistakes_have_a_message_with_the_remedy = refusals(
 )
 
 
-HEAVY = ("scipy", "matplotlib", "xarray", "SurfaceTopography", "pandas")
+HEAVY = ("scipy", "matplotlib", "xarray", "sklearn", "SurfaceTopography", "pandas")
 
 
 def test_nothing_heavy_comes_with_the_package_its_errors_and_its_dir():

@@ -15,6 +15,7 @@ import sys
 
 import numpy as np
 import pytest
+import xarray as xr
 from helpers import contact_of
 
 import mbma_tables
@@ -331,7 +332,6 @@ def test_what_is_unpickled_in_a_new_process_answers_as_before(name, tmp_path):
 def test_a_worker_of_dask_has_the_bits_of_this_process(theory, hardness):
     """Workers are new processes, to which chunks of gaps and the question go by pickle."""
     dask = pytest.importorskip("dask")
-    xr = pytest.importorskip("xarray")
     gaps = xr.DataArray(np.linspace(0.5, 3.0, 24), dims="gap")
     eager = contact(ROUGH, Bodies(hardness=hardness), mean_separation=gaps, theory=theory)
     lazy = contact(
@@ -363,7 +363,6 @@ HARDNESSES = pytest.mark.parametrize(
 @pytest.mark.parametrize("theory", sorted(THEORIES))
 def test_numbers_lists_arrays_and_labels_have_the_same_bits(theory, given, hardness):
     """Each kind of argument, alone and among others, of any shape."""
-    xr = pytest.importorskip("xarray")
     first = contact(
         ROUGH,
         Bodies(hardness=hardness),

@@ -20,7 +20,6 @@ WITHIN_TWO = 0.92  # least share of errors within two standard deviations
 
 @pytest.fixture(scope="module")
 def simulations():
-    pytest.importorskip("xarray", reason="the data set is opened by xarray")
     return boundary_elements()
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from mbma_tables.common.arguments import is_labelled, needed
+from mbma_tables.common.arguments import is_labelled
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
 from mbma_tables.common.plain_text import visible
@@ -160,7 +160,8 @@ def saved(figure: Figure, path: str | os.PathLike[str] | None) -> Figure:
 
 def dataset_of(variables: Mapping[str, Variable], facts: Mapping[str, str]) -> xr.Dataset:
     """An xarray Dataset of variables, with facts as its attributes."""
-    xarray = needed("xarray")
+    import xarray
+
     made = {}
     for name, (values, unit, meaning, dims) in variables.items():
         described = {"units": unit} | ({"long_name": meaning} if meaning else {})

@@ -8,7 +8,6 @@ import pathlib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from mbma_tables.common.arguments import needed
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.toml_files import check, read_toml
 from mbma_tables.islands.island_models import ISLAND_MODELS
@@ -170,7 +169,6 @@ class Scene(Problem):
         ------
         InputError, OutOfRangeError, ConvergenceError
         """
-        needed("xarray")
         from mbma_tables.scenes.run import run_plan
 
         return run_plan(self, self.plan())

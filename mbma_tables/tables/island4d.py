@@ -154,6 +154,27 @@ class Island4dModel:
             Hurst exponent.
         outside : {"raise", "exact", "nan"}
             For islands that the table does not cover: an error, the exact solver, or NaN.
+
+        Returns
+        -------
+        Lookup
+            F_hat in E* s/q0, A_hat in eta/q0^2 and the bound on their relative error, numbers
+            or arrays of the arguments' common shape.
+
+        Raises
+        ------
+        InputError
+            For what is not finite, not real, or not broadcastable.
+        OutOfRangeError
+            For islands outside the table, unless `outside` says otherwise.
+
+        Examples
+        --------
+        >>> from mbma_tables import open_table
+        >>> table = open_table("island4d")
+        >>> found = table.lookup(delta=[0.9, 1.0], zeta_d=3.0, zeta_u=20.0, hurst=0.8)
+        >>> found.F_hat.shape, bool((found.error < 1e-4).all())
+        ((2,), True)
         """
         check_outside(outside)
         one = self._one(delta, zeta_d, zeta_u, hurst)

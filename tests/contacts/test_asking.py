@@ -366,7 +366,6 @@ def test_bodies_apart(theory):
     found = contact(SURFACE, separation=50.0, theory=theory)
     ends = resolve(theory).ends_at_h_max
     assert (found.separation, found.mean_separation) == (50.0, 50.0 if ends else 26.5)
-    xr = pytest.importorskip("xarray")
     for name in ("separation", "mean_separation"):
         plain = contact_of(SURFACE, **{name: [1.0, 50.0]}, theory=theory)
         labelled = contact_of(

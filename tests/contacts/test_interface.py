@@ -6,6 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
+import xarray as xr
 from helpers import refusals
 
 from generate.boundary_elements.solve import load_at
@@ -207,7 +208,6 @@ def test_what_is_refused():
 
 
 def test_batches_and_data_arrays():
-    xr = pytest.importorskip("xarray")
     u = np.array([1.5, 2.0, 2.5])
     bodies = Bodies(nu=0.3)
     plain = contact(FACE, bodies, mean_separation=u, theory="calibrated").tangential(0.3)
@@ -337,7 +337,6 @@ def test_contacts_have_it_in_watts():
         FACE.to("mm"), "steel 1020", pressure=["1 MPa", "10 MPa"], theory="calibrated"
     )
     np.testing.assert_allclose(in_mm.gap_conductance(), plain, rtol=1e-9)
-    xr = pytest.importorskip("xarray")
     named = contact(
         FACE,
         "steel 1020",

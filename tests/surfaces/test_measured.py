@@ -7,6 +7,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
+import xarray as xr
 from helpers import random_map, refusals, run
 from hypothesis import given
 from hypothesis import strategies as st
@@ -285,7 +286,6 @@ class TestCombined:
             assert all(getattr(alone, n) == getattr(known, n) for n in alone.parameters)
 
     def test_labelled_batches_keep_their_names(self):
-        xr = pytest.importorskip("xarray")
         heights = xr.DataArray([1.0, 2.0], dims="ground")
         one = dataclasses.replace(FIVE, h_rms=heights)
         other = dataclasses.replace(

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.signal
+import xarray as xr
 from helpers import random_map, refusals, topographies
 
 from mbma_tables import Surface
@@ -314,7 +315,6 @@ class TestReading:
             Surface.from_map(MAP, STEP, periodic="no")
 
     def test_units_of_a_labelled_array(self):
-        xr = pytest.importorskip("xarray")
         plain = Surface.from_map(MAP, STEP)
         own = xr.DataArray(MAP, dims=("x", "y"), attrs={"units": "um"})
         for dx, unit, scale in (

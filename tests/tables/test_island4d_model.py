@@ -5,6 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
+import xarray as xr
 from small_tables import small_table
 
 from mbma_tables import InputError, OutOfRangeError, greenwood_tripp
@@ -218,3 +219,18 @@ def test_a_table_that_was_used_is_pickled(kind):
         assert lookup(*ONE[kind]) == (
             table.lookup if kind == "island4d" else table.answer
         )(*ONE[kind])
+
+
+def test_a_lookup_by_names_broadcasts_and_takes_lists_and_labelled_arrays():
+    table = open_table("island4d")
+    deltas = np.array([0.9, 1.0])
+    zetas_d = np.array([[2.0], [3.0], [4.0]])
+    found = table.lookup(delta=deltas, zeta_d=zetas_d, zeta_u=20.0, hurst=0.8)
+    for i, j in np.ndindex(3, 2):
+        one = table.lookup(deltas[j], zetas_d[i, 0], 20.0, 0.8)
+        assert [row[i, j] for row in found] == list(one)
+    for kind in (list, xr.DataArray):
+        other = table.lookup(delta=kind(deltas), zeta_d=3.0, zeta_u=20.0, hurst=0.8)
+        np.testing.assert_array_equal(np.array(other), np.array(found)[:, 1])
+    with pytest.raises(InputError, match="delta must be finite"):
+        table.lookup(delta=[1.0, np.nan], zeta_d=3.0, zeta_u=20.0, hurst=0.8)
