@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +21,11 @@ from mbma_tables.common.shared import shared_property
 from mbma_tables.core import core
 from mbma_tables.islands.island_models import SOLVER, IslandAnswer, check_outside
 from mbma_tables.islands.variants import Variant, get_variant
+from mbma_tables.tables.grids import on_grid
 from mbma_tables.tables.schema import Axis, TableContent
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # zeta_d at the end of the axis `sphere`, below the paper's floor of 1.5; as in mbma.h
 SPHERE_FLOOR = 1.25
@@ -208,6 +212,44 @@ class Island4dModel:
                 for row in (place.force * phi_F, place.area * phi_A, error)
             )
         )
+
+    def to_dataset(
+        self,
+        delta: ArrayLike,
+        zeta_d: ArrayLike,
+        zeta_u: ArrayLike,
+        hurst: ArrayLike,
+        outside: str = "nan",
+    ) -> xr.Dataset:
+        """F_hat, A_hat and the bound on their error on a grid.
+
+        Parameters
+        ----------
+        delta, zeta_d, zeta_u, hurst : array_like
+            The axes, each a number or of one dimension; as in `lookup`.
+        outside : {"nan", "raise", "exact"}
+            As in `lookup`; the attribute `outside` of the Dataset states it.
+
+        Returns
+        -------
+        xarray.Dataset
+            F_hat, A_hat and error, of shape (delta, zeta_d, zeta_u, hurst).
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+
+        Examples
+        --------
+        >>> from mbma_tables import open_table
+        >>> table = open_table("island4d")
+        >>> grid = table.to_dataset([0.9, 1.0], zeta_d=3.0, zeta_u=[20, 30], hurst=0.8)
+        >>> dict(grid.sizes)
+        {'delta': 2, 'zeta_d': 1, 'zeta_u': 2, 'hurst': 1}
+        """
+        check_outside(outside)
+        axes = {"delta": delta, "zeta_d": zeta_d, "zeta_u": zeta_u, "hurst": hurst}
+        return on_grid(self.content, axes, self.lookup, outside)
 
     def of_islands(
         self, islands: Mapping[str, FloatArray], outside: str = "raise"

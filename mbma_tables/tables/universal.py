@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -25,7 +25,11 @@ from mbma_tables.islands.island_models import (
     IslandAnswer,
     check_outside,
 )
+from mbma_tables.tables.grids import on_grid
 from mbma_tables.tables.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 BLOCK = 1 << 16  # islands between two checks for Ctrl-C
 TERMS = 8  # terms of each polynomial along each axis
@@ -122,6 +126,30 @@ class UniversalModel(Ranged):
         if one is None or outside not in OUTSIDE:
             return super().answer(X, mu, outside=outside)
         return IslandAnswer._make(map(np.float64, one))
+
+    def to_dataset(self, X: ArrayLike, mu: ArrayLike, outside: str = "nan") -> xr.Dataset:
+        """phi_F, phi_A and the bound on their error on a grid, as an xarray Dataset.
+
+        Parameters
+        ----------
+        X, mu : array_like
+            The axes, each a number or of one dimension.
+        outside : {"nan", "raise", "exact"}
+            As in `answer`; the attribute `outside` of the Dataset states it.
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+
+        Examples
+        --------
+        >>> from mbma_tables import open_table
+        >>> grid = open_table("universal").to_dataset(X=[0.0, 2.0], mu=[0.1, 1.0, 10.0])
+        >>> dict(grid.sizes)
+        {'X': 2, 'mu': 3}
+        """
+        check_outside(outside)
+        return on_grid(self.content, {"X": X, "mu": mu}, self.answer, outside)
 
     def __repr__(self) -> str:
         return f"UniversalModel({self.content.describe()})"

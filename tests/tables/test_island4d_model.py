@@ -234,3 +234,41 @@ def test_a_lookup_by_names_broadcasts_and_takes_lists_and_labelled_arrays():
         np.testing.assert_array_equal(np.array(other), np.array(found)[:, 1])
     with pytest.raises(InputError, match="delta must be finite"):
         table.lookup(delta=[1.0, np.nan], zeta_d=3.0, zeta_u=20.0, hurst=0.8)
+
+
+def test_a_grid_has_what_each_lookup_has_and_nan_outside():
+    table = open_table("island4d")
+    axes = {
+        "delta": [1.5, 2.0, 50.0],
+        "zeta_d": [2.0, 3.0],
+        "zeta_u": 20.0,
+        "hurst": [0.5, 0.8],
+    }
+    grid = table.to_dataset(**axes)
+    assert grid.F_hat.dims == tuple(axes) == tuple(grid.sizes)
+    for name in (*axes, "F_hat", "A_hat", "error"):
+        assert grid[name].attrs["units"] == "1"
+        assert grid[name].attrs["long_name"]
+    assert np.isnan(grid.F_hat.sel(delta=50.0)).all()
+    assert grid.attrs["outside"].startswith("NaN")
+    for place in ({"delta": 1.5, "zeta_d": 3.0}, {"delta": 2.0, "zeta_d": 2.0}):
+        for hurst in axes["hurst"]:
+            one = table.lookup(**place, zeta_u=20.0, hurst=hurst)
+            at = grid.sel(place, method=None).sel(zeta_u=20.0, hurst=hurst)
+            assert (at.F_hat, at.A_hat, at.error) == one
+    with pytest.raises(OutOfRangeError):
+        table.to_dataset(**axes, outside="raise")
+    with pytest.raises(InputError, match="delta must be an axis of one dimension, got 2"):
+        table.to_dataset(**axes | {"delta": [[1.0], [2.0]]})
+    with pytest.raises(InputError, match="hurst must be an axis without equal"):
+        table.to_dataset(**axes | {"hurst": [0.5, 0.5]})
+
+
+def test_a_grid_of_the_universal_table():
+    table = open_table("universal")
+    grid = table.to_dataset(X=[0.0, 2.0, 1e4], mu=[0.1, 10.0])
+    assert grid.phi_F.dims == ("X", "mu")
+    assert np.isnan(grid.phi_A.sel(X=1e4)).all()
+    for X, mu in ((0.0, 10.0), (2.0, 0.1)):
+        at = grid.sel(X=X, mu=mu)
+        assert (at.phi_F, at.phi_A, at.error) == table.answer(X, mu)
