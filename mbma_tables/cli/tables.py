@@ -8,7 +8,8 @@ from typing import Any
 
 import click
 
-from mbma_tables.cli.options import json_option
+from mbma_tables.cli.format import Report
+from mbma_tables.cli.options import Output, json_option, numbers_option, output_options
 from mbma_tables.common import cache
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.netcdf import OWN, OWN_REMEDY, holds_own, read_own
@@ -159,6 +160,40 @@ def info_command(table: str, as_json: bool) -> None:
         lines = [text.format(name=name, **axis) for name, axis in entries.items()]
     lines += [f"{name}: {value}" for name, value in attributes.items()]
     _show({kind: entries, "attributes": attributes}, lines, as_json)
+
+
+@tables_group.command("sample")
+@click.argument("table")
+@numbers_option("--delta", help="Approach over h_rms, of a table of four numbers,")
+@numbers_option("--zeta-d", help="lower magnification,")
+@numbers_option("--zeta-u", help="upper magnification,")
+@numbers_option("--hurst", help="and Hurst exponent.")
+@numbers_option("--X", "X", help="Depth, of a table of two numbers,")
+@numbers_option("--mu", help="and stiffness of the roughness.")
+@output_options
+def sample_command(table: str, output: Output, **axes: list[float] | None) -> None:
+    """Force, area and error of TABLE (a kind or a file) at all combinations of the numbers.
+
+    Islands outside the table are refused.
+
+    Example: mbma tables sample universal --X 1,2 --mu 0.1
+    """
+    from mbma_tables.tables.open import open_table
+
+    model = open_table(table)
+    needed = ("X", "mu") if model.name == UNIVERSAL else tuple(axes)[:4]
+    given = {name: values for name, values in axes.items() if values is not None}
+    if set(given) != set(needed):
+        raise InputError(
+            f"a table of kind {model.name} takes {', '.join(needed)}, "
+            f"got {', '.join(given) or 'none'}"
+        )
+    found = model.to_dataset(**given, outside="raise")
+    columns = found.to_dataframe(dim_order=list(needed)).reset_index()
+    values = {str(name): columns[name].to_numpy() for name in columns}
+    facts = {"table": table, "data_version": model.content.attributes["data_version"]}
+    title = f"islands of {table}"
+    Report("tables sample", title, [], facts, values, {"error": "relative"}).write(output)
 
 
 @tables_group.command("verify")

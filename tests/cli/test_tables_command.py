@@ -7,6 +7,7 @@ import pytest
 from helpers import refused, run
 from small_tables import small_table
 
+from mbma_tables import open_table
 from mbma_tables.tables import open as tabulated
 from mbma_tables.tables.reader import read_table
 from mbma_tables.tables.schema import FORMAT_VERSIONS, KINDS, UNIVERSAL
@@ -98,3 +99,13 @@ def test_a_missing_table_and_a_wrong_kind(folder):
     assert "TABLE" in refused("tables", "info")
     assert "No such command" in refused("tables", "remake")
     assert refused("tables") == "mbma: Missing command.\n(see 'mbma tables --help')\n"
+
+
+def test_a_sample_has_the_lookups_at_all_combinations():
+    asked = ("tables", "sample", "island4d", "--delta", "1.5,2", "--zeta-d", "3")
+    text = run(*asked, "--zeta-u", "20", "--hurst", "0.8", "--json")
+    columns = json.loads(text)["columns"]
+    found = open_table("island4d").lookup([1.5, 2.0], 3.0, 20.0, 0.8)
+    for name in found._fields:
+        assert columns[name] == getattr(found, name).tolist()
+    assert "takes X, mu, got X" in refused("tables", "sample", "universal", "--X", "1")
