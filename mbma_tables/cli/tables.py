@@ -1,5 +1,6 @@
 """`mbma tables`: make tables, show their contents and verify their files; and `mbma cache`, stored simulations."""
 
+import functools
 import json
 import os
 from collections.abc import Iterable
@@ -12,6 +13,7 @@ from mbma_tables.cli.format import Report
 from mbma_tables.cli.options import Output, json_option, numbers_option, output_options
 from mbma_tables.common import cache
 from mbma_tables.common.errors import InputError, TableFileError
+from mbma_tables.common.files import write_file, written_bytes
 from mbma_tables.common.netcdf import OWN, OWN_REMEDY, holds_own, read_own
 from mbma_tables.common.progress import echo
 from mbma_tables.tables.reader import read_table
@@ -174,7 +176,7 @@ def info_command(table: str, as_json: bool) -> None:
 def sample_command(table: str, output: Output, **axes: list[float] | None) -> None:
     """Force, area and error of TABLE (a kind or a file) at all combinations of the numbers.
 
-    Islands outside the table are refused.
+    Islands outside the table are refused. With --out FILE.nc it is a netCDF file.
 
     Example: mbma tables sample universal --X 1,2 --mu 0.1
     """
@@ -189,6 +191,10 @@ def sample_command(table: str, output: Output, **axes: list[float] | None) -> No
             f"got {', '.join(given) or 'none'}"
         )
     found = model.to_dataset(**given, outside="raise")
+    if output.out is not None and output.out.suffix == ".nc":
+        write = functools.partial(found.to_netcdf, engine="netcdf4")
+        write_file(output.out, written_bytes("sample.nc", write))
+        return
     columns = found.to_dataframe(dim_order=list(needed)).reset_index()
     values = {str(name): columns[name].to_numpy() for name in columns}
     facts = {"table": table, "data_version": model.content.attributes["data_version"]}

@@ -3,6 +3,8 @@
 import json
 import re
 
+import netCDF4
+import numpy as np
 import pytest
 from helpers import refused, run
 from small_tables import small_table
@@ -109,3 +111,14 @@ def test_a_sample_has_the_lookups_at_all_combinations():
     for name in found._fields:
         assert columns[name] == getattr(found, name).tolist()
     assert "takes X, mu, got X" in refused("tables", "sample", "universal", "--X", "1")
+
+
+def test_a_sample_may_be_a_netcdf_file(tmp_path):
+    """It was a table of text under that name."""
+    path = tmp_path / "sample.nc"
+    run("tables", "sample", "universal", "--X", "1,2", "--mu", "0.1", "--out", str(path))
+    with netCDF4.Dataset(path) as data:
+        found = np.ma.filled(data["phi_F"][:, 0], np.nan)
+    np.testing.assert_array_equal(
+        found, open_table("universal").answer([1.0, 2.0], 0.1).phi_F
+    )
