@@ -17,19 +17,19 @@ from mbma_tables.core import GENERATIONS, core
 ROOT = pathlib.Path(__file__).parents[2]
 QUICK = [
     "core/test_calibrated_core.py",
-    "theories/mbma/test_core_islands.py",
+    "islands/test_core_islands.py",
 ]
 QUICK += [
     "theories/mbma/test_kernel.py",
     "law/test_law.py",
-    "theories/mbma/test_island_models.py",
+    "islands/test_island_models.py",
 ]
 MORE = [
-    "theories/mbma/test_geometry.py",
-    "theories/mbma/test_universal_model.py",
+    "islands/test_geometry.py",
+    "tables/test_universal_model.py",
     "theories/mbma/test_contact.py",
 ]
-MORE += ["theories/mbma/test_island4d_model.py", "theories/mbma/test_closed_forms.py"]
+MORE += ["tables/test_island4d_model.py", "theories/mbma/test_closed_forms.py"]
 MORE += [
     "theories/calibrated/test_calibrated_theory.py",
     "theories/yielding/test_yielding.py",
