@@ -180,8 +180,10 @@ def _of_the_side(surface: AnySurface) -> dict[str, Any]:
         return {}
     waves = np.asarray(steps["nominal_area"]["waves_a_side"])
     short = waves < SIDE * (1 - ROUNDING)
-    # rounded down, so that the text does not say "4, fewer than 4"
-    shortest = f"{math.floor(100 * float(waves.min())) / 100:g}"
+    # rounded down, so that the text does not say "4, fewer than 4"; but for the rounding of
+    # units, by which 2 in one unit of length is 1.9999999 in another
+    hundredths = math.floor(100 * float(waves.min()) * (1 + ROUNDING))
+    shortest = f"{hundredths / 100:g}"
     text = (
         f"the nominal area has {shortest} longest wavelengths a side, fewer than {SIDE:g}: surfaces with so "
         "few summits differ by more than the scatter; contact(Surface.from_map(...), theory='simulated') "
