@@ -41,8 +41,8 @@ WITHOUT_FMA = {
 }
 PROCESSORS = {"this one": {}, "with FMA": HASWELL, "without FMA": WITHOUT_FMA}
 # largest difference of rebuilt lookups and of the spline: a unit of the 40 digits is 9e-13
-# of a cell's mean; coefficients of the spline are of single precision, of which one was seen
-# to differ by two units (1.5e-7 of the largest) between AVX2 and AVX-512
+# of a cell's mean; coefficients of the spline are of single precision, and one was seen to
+# differ by 1.5e-7 of the largest, the cause of which is not known
 REBUILT = {"universal": 1e-11, "island4d": 2 * float(np.finfo(np.float32).eps)}
 
 
