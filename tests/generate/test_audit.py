@@ -97,14 +97,14 @@ def check_routes(question):
     assert not differences
 
 
-@settings(max_examples=15, derandomize=True)
+@settings(max_examples=15)
 @given(questions())
 def test_every_route_answers_a_question_alike(question):
     check_routes(question)
 
 
 @pytest.mark.slow
-@settings(max_examples=40, derandomize=True)
+@settings(max_examples=150)
 @given(questions())
 def test_every_route_answers_many_questions_alike(question):
     check_routes(question)
