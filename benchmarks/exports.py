@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.kernels import held_out
 from benchmarks.rows import microseconds, report, rounds, times_faster
 from mbma_tables import contact, open_table
-from mbma_tables.export.c_code import FLAGS, SOURCES, write_code
+from mbma_tables.export.model.c_code import FLAGS, SOURCES, write_code
 from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma.sums import QUADRATURE_SHARE
 

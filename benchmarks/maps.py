@@ -11,7 +11,7 @@ from benchmarks.rows import report
 from generate.boundary_elements.surfaces import Recipe, heights
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.common.cache import VARIABLE
-from mbma_tables.export.law_rows import describe_law
+from mbma_tables.export.rows.law_rows import describe_law
 from mbma_tables.theories import Simulated
 
 SEEDS = 5

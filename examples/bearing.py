@@ -24,7 +24,7 @@ from scipy.sparse.linalg import spsolve
 
 from mbma_tables import Surface
 from mbma_tables.common.plots import to_picture
-from mbma_tables.export.law_rows import describe_law
+from mbma_tables.export.rows.law_rows import describe_law
 
 # m
 RADIUS = 25e-3

@@ -24,9 +24,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mbma_tables import Bodies, Surface, contact, materials
-from mbma_tables.bodies import mean_conductivity
+from mbma_tables.bodies.bodies import mean_conductivity
 from mbma_tables.common.plots import to_picture
-from mbma_tables.quantities.conductances import cooper_mikic_yovanovich
+from mbma_tables.contacts.quantities.conductances import cooper_mikic_yovanovich
 
 # both faces' roughness in one: wavelengths from 1 mm to 8 um
 JOINT = Surface(

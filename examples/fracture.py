@@ -19,7 +19,7 @@ from scipy.integrate import quad
 
 from mbma_tables import Surface, contact
 from mbma_tables.common.plots import to_picture
-from mbma_tables.export.law_rows import LawTable, describe_law
+from mbma_tables.export.rows.law_rows import LawTable, describe_law
 
 # both faces' roughness together: wavelengths from 20 mm to 0.1 mm that do not fit into each other
 FRACTURE = Surface(

@@ -17,9 +17,9 @@ from scipy.sparse import block_diag, coo_matrix
 from skfem import Basis, BilinearForm, ElementQuad2, LinearForm, MeshQuad, condense, solve
 
 from mbma_tables import Bodies, Surface, contact, materials
-from mbma_tables.bodies import mean_conductivity
+from mbma_tables.bodies.bodies import mean_conductivity
 from mbma_tables.common.plots import to_picture
-from mbma_tables.export.law_rows import describe_law
+from mbma_tables.export.rows.law_rows import describe_law
 
 # m: radii of the hole, of the pressed ring, of the plates
 HOLE = 4e-3

@@ -24,10 +24,10 @@ import numpy as np
 from click.testing import CliRunner
 
 from mbma_tables import Bodies, Joint, contact
+from mbma_tables.bodies.materials import METALS
 from mbma_tables.cli import main
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, MbmaError
-from mbma_tables.materials import METALS
 from mbma_tables.theories import Mbma
 
 # relative: numbers pass through decimals, powers of ten of units and an inversion

@@ -35,10 +35,10 @@ from generate.calibrated_file import write as write_table
 from generate.files import dataset
 from generate.leakage_law import write as write_leakage
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.data import FILE
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.calibrated.formulas import CONSTANTS, Constants, Law, Spectrum
 from mbma_tables.theories.calibrated.map_curves import MAP_CONSTANTS, MapConstants
+from mbma_tables.theories.dataset import FILE
 from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
 from mbma_tables.theories.mbma.theory import Mbma
 from mbma_tables.theories.persson import Persson

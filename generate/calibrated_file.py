@@ -21,11 +21,11 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file, written_bytes
 from mbma_tables.common.netcdf import HDF5_LOCK, SEAL
 from mbma_tables.common.workers import results
-from mbma_tables.data import read_groups
 from mbma_tables.tables.sources import source_digest, versions
 from mbma_tables.tables.splines import coefficients
 from mbma_tables.theories.calibrated.formulas import Constants, Law, Spectrum
 from mbma_tables.theories.calibrated.table import AXES, load
+from mbma_tables.theories.dataset import read_groups
 
 # as the file names them: the library's "pressure" is "force" there
 QUANTITIES = ("area", "force", "stiffness")

@@ -29,11 +29,11 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.files import write_file
 from mbma_tables.core import core
+from mbma_tables.design.scenes.plan import UNIT, Row
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.island_models import ISLAND_MODELS, answer_islands
 from mbma_tables.islands.variants import get_variant
-from mbma_tables.scenes.plan import UNIT, Row
 from mbma_tables.tables.certificate import phi
 from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma.closed_forms import FormulaModel

@@ -23,7 +23,7 @@ from generate.files import read_csv, to_csv
 from generate.timing import measure
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.scenes.plan import Distance
+from mbma_tables.design.scenes.plan import Distance
 from mbma_tables.theories import Mbma, Persson, Theory
 from mbma_tables.theories.calibrated.formulas import Law, Spectrum, area
 

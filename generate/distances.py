@@ -36,7 +36,6 @@ from generate.page import percent, table
 from mbma_tables import theories
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError, MbmaError
-from mbma_tables.data import FILE
 from mbma_tables.islands.variants import REPORTED, Variant
 from mbma_tables.theories.calibrated.formulas import (
     CONSTANTS,
@@ -45,6 +44,7 @@ from mbma_tables.theories.calibrated.formulas import (
     Spectrum,
 )
 from mbma_tables.theories.calibrated.map_curves import MAP_CONSTANTS
+from mbma_tables.theories.dataset import FILE
 
 # A/A0 of the simulations between which distances are summed up
 LOW = 0.01

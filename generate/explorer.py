@@ -22,9 +22,9 @@ from generate.files import ROOT
 from generate.page import Cell, Measured, table
 from mbma_tables import Surface
 from mbma_tables.common.files import write_file
-from mbma_tables.export import c_code
-from mbma_tables.export.explorer import MODULE, explorer_page
-from mbma_tables.export.languages.javascript import LAW_MODULE
+from mbma_tables.export.code.languages.javascript import LAW_MODULE
+from mbma_tables.export.model import c_code
+from mbma_tables.export.page.explorer import MODULE, explorer_page
 from mbma_tables.export.text import core_file
 from mbma_tables.islands.variants import REPORTED
 from mbma_tables.tables.open import universal_model

@@ -4,7 +4,7 @@ import functools
 import pathlib
 from typing import Any
 
-from mbma_tables.data import FILE, boundary_elements
+from mbma_tables.theories.dataset import FILE, boundary_elements
 
 ROOT = pathlib.Path(__file__).parents[1]
 DATA = ROOT / "docs" / "data"

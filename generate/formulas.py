@@ -30,7 +30,7 @@ from generate.files import ROOT
 from mbma_tables import Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file
-from mbma_tables.export.own_formula import certificate, rounded
+from mbma_tables.export.model.own_formula import certificate, rounded
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.island_models import Certificate
 from mbma_tables.theories.mbma.closed_form_certificates import RANGES

@@ -33,10 +33,9 @@ from generate.calibrated_file import (
 )
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.workers import results
-from mbma_tables.data import FILE
-from mbma_tables.quantities import effective_medium as leakage
-from mbma_tables.quantities.effective_medium import FlowConstants
-from mbma_tables.quantities.leakage import GROUP
+from mbma_tables.contacts.quantities import effective_medium as leakage
+from mbma_tables.contacts.quantities.effective_medium import FlowConstants
+from mbma_tables.contacts.quantities.leakage import GROUP
 from mbma_tables.tables.splines import coefficients
 from mbma_tables.theories import resolve
 from mbma_tables.theories.calibrated.formulas import (
@@ -47,6 +46,7 @@ from mbma_tables.theories.calibrated.formulas import (
     light_factor,
 )
 from mbma_tables.theories.calibrated.table import load
+from mbma_tables.theories.dataset import FILE
 from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
 from mbma_tables.theories.mbma.theory import Mbma
 from mbma_tables.theories.persson import Persson

@@ -1,6 +1,6 @@
 """`python -m generate quantities`: typed properties of contacts, laws and joints, from the registry of quantities.
 
-Editors and type checkers complete the names of quantities by these; `tests/quantities`
+Editors and type checkers complete the names of quantities by these; `tests/contacts/quantities`
 compares the file with the registry.
 """
 
@@ -11,7 +11,7 @@ import textwrap
 import click
 
 from mbma_tables.common.files import write_file
-from mbma_tables.quantities import registry
+from mbma_tables.contacts.quantities import registry
 
 FILE = pathlib.Path(registry.__file__).with_name("properties.py")
 HEAD = '''"""Typed access to the quantities of the registry, written by `python -m generate quantities`; do not edit."""

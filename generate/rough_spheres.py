@@ -16,7 +16,7 @@ from generate.boundary_elements.solve import Contact
 from generate.calibrated_file import write_part
 from generate.machined.makers import rough
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.data import FILE
+from mbma_tables.theories.dataset import FILE
 
 POINTS = 320
 SHORTEST = 6.0

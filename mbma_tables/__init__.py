@@ -15,20 +15,21 @@ from mbma_tables.common.errors import TableFileError as TableFileError
 
 if TYPE_CHECKING:
     from mbma_tables import theories as theories
-    from mbma_tables.bodies import Bodies as Bodies
+    from mbma_tables.bodies import materials as materials
+    from mbma_tables.bodies.bodies import Bodies as Bodies
     from mbma_tables.contacts.contact import contact as contact
-    from mbma_tables.contacts.film import FlowFactors as FlowFactors
-    from mbma_tables.contacts.film import flow_factors as flow_factors
+    from mbma_tables.contacts.law.law import ContactLaw as ContactLaw
+    from mbma_tables.contacts.law.make import contact_law as contact_law
+    from mbma_tables.contacts.quantities.interface import Gas as Gas
     from mbma_tables.contacts.result import Contact as Contact
-    from mbma_tables.contacts.sensitivity import sensitivity as sensitivity
+    from mbma_tables.design.joint import Joint as Joint
+    from mbma_tables.design.scenes.scene import Scene as Scene
+    from mbma_tables.design.sensitivity import sensitivity as sensitivity
+    from mbma_tables.effects.film import FlowFactors as FlowFactors
+    from mbma_tables.effects.film import flow_factors as flow_factors
+    from mbma_tables.effects.rough_contact import RoughContact as RoughContact
+    from mbma_tables.effects.rough_contact import rough_contact as rough_contact
     from mbma_tables.islands import greenwood_tripp as greenwood_tripp
-    from mbma_tables.joint import Joint as Joint
-    from mbma_tables.law.law import ContactLaw as ContactLaw
-    from mbma_tables.law.make import contact_law as contact_law
-    from mbma_tables.quantities.interface import Gas as Gas
-    from mbma_tables.rough_body.rough_contact import RoughContact as RoughContact
-    from mbma_tables.rough_body.rough_contact import rough_contact as rough_contact
-    from mbma_tables.scenes.scene import Scene as Scene
     from mbma_tables.surfaces.surface import Surface as Surface
     from mbma_tables.tables.open import open_table as open_table
     from mbma_tables.theories.mbma.island import Island as Island
@@ -38,25 +39,26 @@ __version__ = "0.2.0"
 
 _ERRORS = tuple(name for name in globals() if name.endswith("Error"))
 _HOMES = {
-    "Bodies": "mbma_tables.bodies",
+    "Bodies": "mbma_tables.bodies.bodies",
     "Contact": "mbma_tables.contacts.result",
-    "FlowFactors": "mbma_tables.contacts.film",
-    "Gas": "mbma_tables.quantities.interface",
+    "FlowFactors": "mbma_tables.effects.film",
+    "Gas": "mbma_tables.contacts.quantities.interface",
     "Island": "mbma_tables.theories.mbma.island",
-    "Joint": "mbma_tables.joint",
-    "RoughContact": "mbma_tables.rough_body.rough_contact",
+    "Joint": "mbma_tables.design.joint",
+    "RoughContact": "mbma_tables.effects.rough_contact",
     "Surface": "mbma_tables.surfaces.surface",
-    "ContactLaw": "mbma_tables.law.law",
-    "Scene": "mbma_tables.scenes.scene",
+    "ContactLaw": "mbma_tables.contacts.law.law",
+    "Scene": "mbma_tables.design.scenes.scene",
     "contact": "mbma_tables.contacts.contact",
-    "contact_law": "mbma_tables.law.make",
-    "flow_factors": "mbma_tables.contacts.film",
+    "contact_law": "mbma_tables.contacts.law.make",
+    "flow_factors": "mbma_tables.effects.film",
     "island": "mbma_tables.theories.mbma.island",
     "open_table": "mbma_tables.tables.open",
-    "rough_contact": "mbma_tables.rough_body.rough_contact",
-    "sensitivity": "mbma_tables.contacts.sensitivity",
+    "rough_contact": "mbma_tables.effects.rough_contact",
+    "sensitivity": "mbma_tables.design.sensitivity",
     # modules
     "greenwood_tripp": "mbma_tables.islands.greenwood_tripp",
+    "materials": "mbma_tables.bodies.materials",
     "theories": "mbma_tables.theories",
 }
 

@@ -12,8 +12,8 @@ from independent_reader import Reader, seal_matches
 from small_tables import KINDS
 
 from mbma_tables import Surface
-from mbma_tables.export.data import to_netcdf
-from mbma_tables.export.law_rows import describe_law
+from mbma_tables.export.rows.data import to_netcdf
+from mbma_tables.export.rows.law_rows import describe_law
 
 SHIPPED = pathlib.Path(__file__).parents[1] / "tables"
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from mbma_tables import TableFileError, data
-from mbma_tables.data import boundary_elements
+from mbma_tables import TableFileError
+from mbma_tables.theories import dataset as data
+from mbma_tables.theories.dataset import boundary_elements
 
 GROUPS = [
     "elastic",

@@ -19,9 +19,9 @@ from mbma_tables import (
     sensitivity,
 )
 from mbma_tables.cli import main
-from mbma_tables.export.explorer import explorer_page
 from mbma_tables.export.exported_law import exported_law
-from mbma_tables.export.law_rows import describe_law
+from mbma_tables.export.page.explorer import explorer_page
+from mbma_tables.export.rows.law_rows import describe_law
 from mbma_tables.theories import Mbma, Persson, resolve
 
 NUMBERS = {"hurst": 0.8, "q0": 0.05, "q1": 1.5, "h_rms": 0.5, "h_max": 1.75}

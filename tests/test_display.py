@@ -18,7 +18,7 @@ from mbma_tables import (
     sensitivity,
 )
 from mbma_tables.common.plots import Curve, draw_compression, to_picture
-from mbma_tables.export.law_rows import describe_law
+from mbma_tables.export.rows.law_rows import describe_law
 
 ROAD = Surface.named("concrete")
 SPECTRUM = Surface.from_spectrum(

@@ -21,6 +21,7 @@ from mbma_tables import (
     island,
     open_table,
 )
+from mbma_tables.bodies.materials import effective_modulus
 from mbma_tables.common.arguments import SHOWN, finite_array, require
 from mbma_tables.common.errors import (
     ConvergenceError,
@@ -30,7 +31,6 @@ from mbma_tables.common.errors import (
     OutOfRangeError,
 )
 from mbma_tables.islands.greenwood_tripp import height_integral
-from mbma_tables.materials import effective_modulus
 from mbma_tables.theories import Mbma
 
 

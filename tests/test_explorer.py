@@ -13,8 +13,8 @@ from helpers import compiled_law, contact_of, random_map, refused, run
 
 from generate.explorer import c_sources, digest_of, law_sources
 from mbma_tables import Bodies, InputError, Surface, contact
-from mbma_tables.export.explorer import MODULE, explorer_page
-from mbma_tables.export.languages.javascript import LAW_MODULE
+from mbma_tables.export.code.languages.javascript import LAW_MODULE
+from mbma_tables.export.page.explorer import MODULE, explorer_page
 from mbma_tables.export.text import page_file
 from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma.sums import by_table

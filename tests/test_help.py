@@ -6,7 +6,7 @@ import pydoc
 import pytest
 
 import mbma_tables
-from mbma_tables import materials
+from mbma_tables.bodies import materials
 
 FUNCTIONS = {name: getattr(mbma_tables, name) for name in mbma_tables.__all__}
 FUNCTIONS |= {

@@ -22,9 +22,9 @@ from mbma_tables.common.units import (
     resolve,
     unit_of,
 )
-from mbma_tables.export.law_rows import describe_law
-from mbma_tables.quantities.registry import registry
-from mbma_tables.quantities.registry import unit_of as unit_of_quantity
+from mbma_tables.contacts.quantities.registry import registry
+from mbma_tables.contacts.quantities.registry import unit_of as unit_of_quantity
+from mbma_tables.export.rows.law_rows import describe_law
 
 # in metres and pascals, written down again: 1 in = 25.4 mm, 1 lbf = 4.4482216152605 N
 METRES = {

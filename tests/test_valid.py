@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mbma_tables import Bodies, Joint, Surface, contact
-from mbma_tables.data import boundary_elements
+from mbma_tables.theories.dataset import boundary_elements
 
 HELD_OUT = ("held_out_surface", "held_out_spectrum")
 # q0 h_rms of the surfaces here: slopes are small, as theories and simulations take them

@@ -46,11 +46,11 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.common.files import write_file
 from mbma_tables.common.workers import results
-from mbma_tables.data import FILE
-from mbma_tables.quantities.gas import mean_inverse
+from mbma_tables.contacts.quantities.gas import mean_inverse
 from mbma_tables.surfaces.bearing_curve import FRACTIONS, QUANTILES, bearing
 from mbma_tables.surfaces.maps import prepared as treated_map
 from mbma_tables.surfaces.treatment import Treated, mirrored
+from mbma_tables.theories.dataset import FILE
 from mbma_tables.theories.simulated.boundary_elements import LOADS
 from mbma_tables.theories.simulated.boundary_elements import Contact as YieldingContact
 

@@ -22,9 +22,9 @@ from generate.machined.makers import FAMILIES, GRADIENT, Part, heights
 from mbma_tables import Bodies, Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
-from mbma_tables.data import FILE
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import Calibrated, Simulated
+from mbma_tables.theories.dataset import FILE
 from mbma_tables.theories.simulated import boundary_elements
 from mbma_tables.theories.simulated.own_map import law_loads
 from mbma_tables.theories.simulated.reynolds import flow_conductance

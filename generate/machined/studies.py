@@ -14,11 +14,11 @@ from generate.calibrated_file import rms, write_part
 from generate.machined.makers import GRADIENT, finished, rough
 from mbma_tables import Surface, flow_factors
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.data import FILE
-from mbma_tables.quantities.effective_medium import wide_gap
-from mbma_tables.quantities.lay import CONSTANTS, factors, stress_shares
-from mbma_tables.quantities.leakage import shipped_flow
+from mbma_tables.contacts.quantities.effective_medium import wide_gap
+from mbma_tables.contacts.quantities.lay import CONSTANTS, factors, stress_shares
+from mbma_tables.contacts.quantities.leakage import shipped_flow
 from mbma_tables.surfaces.bearing_curve import bearing
+from mbma_tables.theories.dataset import FILE
 from mbma_tables.theories.simulated.reynolds import flow_and_couette
 
 Recipe = tuple[float, float, int]  # lay, Hurst exponent and seed
@@ -162,7 +162,7 @@ def recipes_of_rows() -> list[tuple[float | bool, ...]]:
 def tangential() -> None:
     """Stiffness ratios of stuck contacts by boundary elements, for docs/joints.md: two minutes a set of surfaces.
 
-    The constants of `mbma_tables.quantities.lay` are fitted to the first set; the second
+    The constants of `mbma_tables.contacts.quantities.lay` are fitted to the first set; the second
     has other seeds, Hurst exponents and lays.
     """
     rows_of_sets = {kind: tangential_rows(kind) for kind in SETS}
@@ -231,7 +231,7 @@ def film_rows() -> FloatArray:
 def film() -> None:
     """Flow factors against Reynolds' equation on simulated gaps, for docs/lubrication.md: six minutes.
 
-    No constant of `mbma_tables.quantities.lay` was fitted to these surfaces.
+    No constant of `mbma_tables.contacts.quantities.lay` was fitted to these surfaces.
     """
     lay, gamma, u, area, *columns = film_rows()
     flow, sheared, whole = np.reshape(columns, (3, 2, -1))

@@ -19,7 +19,7 @@ from generate.distances import DEEP, HUES, LOW, THEORIES
 from generate.files import ROOT, dataset, read_csv
 from generate.machined.evaluation import TITLES
 from generate.page import Measured, panels, printed
-from mbma_tables.scenes.plan import shipped_costs
+from mbma_tables.design.scenes.plan import shipped_costs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -34,8 +34,8 @@ from mbma_tables import Bodies, Surface, contact, materials
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.quantities.effective_medium import FlowConstants
-from mbma_tables.quantities.leakage import GROUP, shipped_flow
+from mbma_tables.contacts.quantities.effective_medium import FlowConstants
+from mbma_tables.contacts.quantities.leakage import GROUP, shipped_flow
 from mbma_tables.theories.calibrated.formulas import CONSTANTS
 from mbma_tables.theories.calibrated.table import shipped
 from mbma_tables.theories.evidence import shipped_part

@@ -25,7 +25,7 @@ from generate.files import ROOT
 from generate.page import Cell, Measured, duration, panels, table
 from mbma_tables import Surface, contact
 from mbma_tables.common.plots import draw_compression, theory_label
-from mbma_tables.scenes.plan import shipped_costs, shipped_distances
+from mbma_tables.design.scenes.plan import shipped_costs, shipped_distances
 from mbma_tables.tables.open import shipped
 from mbma_tables.tables.reader import read_table
 from mbma_tables.tables.schema import (

@@ -23,12 +23,12 @@ from generate.machined import studies
 from generate.page import Cell, Measured, Picture, panels, percent, table
 from generate.rough_spheres import RADIUS, heights
 from mbma_tables import Contact, Joint, Surface, flow_factors, rough_contact
-from mbma_tables.bodies import mean_conductivity
+from mbma_tables.bodies.bodies import mean_conductivity
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.data import boundary_elements
-from mbma_tables.quantities.conductances import cooper_mikic_yovanovich
-from mbma_tables.rough_body.rough_contact import mean_wavelength
+from mbma_tables.contacts.quantities.conductances import cooper_mikic_yovanovich
+from mbma_tables.effects.rough_contact import mean_wavelength
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.theories.dataset import boundary_elements
 from mbma_tables.theories.simulated.reynolds import flow_and_couette
 
 if TYPE_CHECKING:

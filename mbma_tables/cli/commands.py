@@ -13,8 +13,8 @@ from mbma_tables.cli.format import Report, column_unit, columns_of, report_answe
 from mbma_tables.common.arguments import finite_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.progress import echo
-from mbma_tables.quantities.registry import unit_of
-from mbma_tables.scenes.specimen import Specimen
+from mbma_tables.contacts.quantities.registry import unit_of
+from mbma_tables.design.scenes.specimen import Specimen
 
 if TYPE_CHECKING:
     from mbma_tables.contacts.result import Contact
@@ -132,7 +132,7 @@ def curve_command(
     options.check_plot(plot, output.out)
     from mbma_tables.common import plots
     from mbma_tables.contacts.contact import contact
-    from mbma_tables.scenes.run import other_theory
+    from mbma_tables.design.scenes.run import other_theory
 
     model = model.of(specimen.surface)
     surface = specimen.surface
@@ -197,7 +197,7 @@ def sensitivity_command(
     Example: mbma sensitivity --surface concrete --E-star 13.3MPa -p 100kPa
     """
     from mbma_tables.contacts.question import name_of_the_given
-    from mbma_tables.contacts.sensitivity import sensitivity
+    from mbma_tables.design.sensitivity import sensitivity
 
     given = dict.fromkeys(options.LOADS) | loads
     model = model.of(specimen.surface, name_of_the_given(given))
@@ -319,7 +319,7 @@ def fit_command(
         draw,
         table_of_loads,
     )
-    from mbma_tables.scenes.specimen import effective_modulus_of, measured
+    from mbma_tables.design.scenes.specimen import effective_modulus_of, measured
     from mbma_tables.surfaces.averages import average
     from mbma_tables.theories import Simulated, default_name, resolve
 
@@ -374,7 +374,7 @@ def cost_command(distance: bool, as_json: bool) -> None:
 
     Example: mbma cost --distance
     """
-    from mbma_tables.scenes.plan import UNIT, shipped_costs, shipped_distances
+    from mbma_tables.design.scenes.plan import UNIT, shipped_costs, shipped_distances
 
     costs = shipped_costs()
     rows: Any = (

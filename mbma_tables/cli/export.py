@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mbma_tables.bodies.materials import tangential_ratio
 from mbma_tables.cli import options
 from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import MAX_BYTES, read_file, write_file
 from mbma_tables.common.progress import echo
+from mbma_tables.design.scenes.specimen import Specimen
 from mbma_tables.export.targets import (
     OPTIONS,
     Target,
@@ -23,8 +25,6 @@ from mbma_tables.export.targets import (
     write_files,
 )
 from mbma_tables.export.text import written_by
-from mbma_tables.materials import tangential_ratio
-from mbma_tables.scenes.specimen import Specimen
 
 if TYPE_CHECKING:
     from mbma_tables.export.law_table import LawTable
@@ -224,7 +224,7 @@ def _rows(target: Target, asked: dict[str, Any]) -> LawTable | list[LawTable]:
 
 
 def _rows_of(target: Target, quantity: str, asked: dict[str, Any]) -> LawTable:
-    from mbma_tables.export.law_rows import describe_law
+    from mbma_tables.export.rows.law_rows import describe_law
 
     asked = asked | {"quantity": quantity, "most_rows": target.most.get(quantity)}
     # of Lethe, whose numbers do not depend on the conductivity
@@ -245,7 +245,7 @@ def _rows_of(target: Target, quantity: str, asked: dict[str, Any]) -> LawTable:
 
 
 def _export_code(folder: Path, variant: str, table: str | None, check: bool) -> None:
-    from mbma_tables.export import c_code
+    from mbma_tables.export.model import c_code
 
     for path in c_code.write_code(folder, variant, table):
         echo(path)
@@ -290,7 +290,7 @@ def explore_command(
 
     Example: mbma explore --surface concrete --E-star 13.3MPa --out explorer.html
     """
-    from mbma_tables.export.explorer import explorer_page
+    from mbma_tables.export.page.explorer import explorer_page
 
     stress = specimen.stress_unit
     title = specimen.title

@@ -15,17 +15,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mbma_tables import __version__
+from mbma_tables.bodies.materials import ELASTIC_PSI
 from mbma_tables.cli.options import Model, Output
 from mbma_tables.common.display import shown
 from mbma_tables.common.files import write_file
 from mbma_tables.common.plain_text import visible
 from mbma_tables.common.progress import echo
 from mbma_tables.common.units import Units
+from mbma_tables.contacts.quantities import registry
+from mbma_tables.contacts.quantities.registry import unit_of
+from mbma_tables.design.scenes.specimen import Specimen
 from mbma_tables.export.text import comment
-from mbma_tables.materials import ELASTIC_PSI
-from mbma_tables.quantities import registry
-from mbma_tables.quantities.registry import unit_of
-from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.surface import assumptions
 
 if TYPE_CHECKING:

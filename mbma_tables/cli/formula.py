@@ -43,7 +43,12 @@ def formula_command(
 
     Example: mbma tables formula --config range.toml --terms 8 --as latex --as c
     """
-    from mbma_tables.export.own_formula import EXAMPLE, fit_formula, read_range, written
+    from mbma_tables.export.model.own_formula import (
+        EXAMPLE,
+        fit_formula,
+        read_range,
+        written,
+    )
 
     if example:
         echo(EXAMPLE.rstrip())

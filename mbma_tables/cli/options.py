@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 
 import click
 
-from mbma_tables.bodies import Bodies
+from mbma_tables.bodies.bodies import Bodies
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import KINDS
+from mbma_tables.design.scenes import specimen as specimens
+from mbma_tables.design.scenes.specimen import Specimen
 from mbma_tables.islands.island_models import ISLAND_MODELS
 from mbma_tables.islands.variants import NAMED
-from mbma_tables.scenes import specimen as specimens
-from mbma_tables.scenes.specimen import Specimen
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import ROUGHNESS
 from mbma_tables.surfaces.self_affine import CASES

@@ -50,7 +50,7 @@ def plan_command(file: Path, as_json: bool) -> None:
 
     Example: mbma plan examples/scene_joint.toml
     """
-    from mbma_tables.scenes.scene import Scene
+    from mbma_tables.design.scenes.scene import Scene
 
     scene = Scene.from_toml(file)
     if not as_json:
@@ -84,7 +84,7 @@ def run_command(file: Path, out: Path | None, as_json: bool) -> None:
     """
     if out is not None and str(out) != "-" and out.suffix not in SUFFIXES:
         raise InputError(f"--out must end with one of {', '.join(SUFFIXES)}, got {out}")
-    from mbma_tables.scenes.scene import Scene
+    from mbma_tables.design.scenes.scene import Scene
 
     found = Scene.from_toml(file).run()
     # the quantities at gaps, or at islands if there are none at gaps
@@ -125,7 +125,7 @@ def _flag(name: str) -> str:
 
 def _export_joint(file: Path, out: Path, target: str, **options: Any) -> None:
     """Write the joint of a file for another program."""
-    from mbma_tables.joint import Joint
+    from mbma_tables.design.joint import Joint
 
     digest = hashlib.sha256(read_file(file, MAX_BYTES)).hexdigest()
     command = written_by(click.get_current_context().obj[1:], "joint")
@@ -220,7 +220,7 @@ def joint_command(
         )
     check_plot(plot, output.out)
     from mbma_tables.common.plots import to_picture
-    from mbma_tables.joint import Joint
+    from mbma_tables.design.joint import Joint
 
     joint = Joint.from_toml(file)
     joint.require_one("a table")

@@ -56,7 +56,7 @@ ALIASES = {
     "N/m2": "Pa",
 }
 # powers of length and of stress of arguments, and of numbers of surfaces and islands; those
-# of the quantities of a contact are declared in `mbma_tables.quantities`
+# of the quantities of a contact are declared in `mbma_tables.contacts.quantities`
 _NAMES_OF_POWERS = {
     (1, 0): (
         "h_rms h_max Ra Rq Rsm Sa Sq Sp longest shortest rolloff separation "
@@ -432,7 +432,7 @@ def unit_of(name: str, units: Units) -> str:
     """The unit of an argument or of a number of a surface, such as "1/um"; "1" for pure numbers.
 
     A name that is not in `DIMENSIONS` is a KeyError: that of a quantity is in its declaration,
-    `mbma_tables.quantities.registry.unit_of`.
+    `mbma_tables.contacts.quantities.registry.unit_of`.
     """
     return Dimension(*DIMENSIONS[name]).unit(units)
 

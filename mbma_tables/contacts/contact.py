@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.bodies import Bodies, BodiesInUnits
+from mbma_tables.bodies.bodies import Bodies, BodiesInUnits
 from mbma_tables.common.arguments import (
     FloatArray,
     any_labelled,
@@ -22,9 +22,9 @@ from mbma_tables.common.arguments import (
     spread,
 )
 from mbma_tables.common.errors import OutOfRangeError
+from mbma_tables.contacts.quantities.interface import NOTHING_BETWEEN, Interface
 from mbma_tables.contacts.question import GAPS, Question, both_separations
 from mbma_tables.contacts.result import Contact, Setup
-from mbma_tables.quantities.interface import NOTHING_BETWEEN, Interface
 from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
 from mbma_tables.theories import resolve
 from mbma_tables.theories.base import (
@@ -83,7 +83,7 @@ def contact(
     Returns
     -------
     Contact
-        Every quantity of `mbma_tables.quantities` by its name, with its model uncertainty
+        Every quantity of `mbma_tables.contacts.quantities` by its name, with its model uncertainty
         and validity.
 
     Raises

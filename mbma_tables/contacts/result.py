@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.bodies import BodiesInUnits
+from mbma_tables.bodies.bodies import BodiesInUnits
+from mbma_tables.bodies.materials import ELASTIC_PSI
 from mbma_tables.common.arguments import (
     FloatArray,
     Numbers,
@@ -30,23 +31,22 @@ from mbma_tables.common.plots import (
     theory_label,
 )
 from mbma_tables.common.progress import shown as progress
-from mbma_tables.contacts.question import GAPS, both_separations
-from mbma_tables.materials import ELASTIC_PSI
-from mbma_tables.quantities import registry
-from mbma_tables.quantities.interface import NOTHING_BETWEEN, Gas, Interface
-from mbma_tables.quantities.state import State
-from mbma_tables.quantities.tangential import Tangential, sheared
-from mbma_tables.quantities.validity import (
+from mbma_tables.contacts.quantities import registry
+from mbma_tables.contacts.quantities.interface import NOTHING_BETWEEN, Gas, Interface
+from mbma_tables.contacts.quantities.state import State
+from mbma_tables.contacts.quantities.tangential import Tangential, sheared
+from mbma_tables.contacts.quantities.validity import (
     reasons_of_contact,
     reasons_with_masks,
     valid_where_none,
 )
+from mbma_tables.contacts.question import GAPS, both_separations
 from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
 from mbma_tables.surfaces.surface import assumptions
 from mbma_tables.theories.base import Theory, TheoryAnswer
 
 if TYPE_CHECKING:
-    from mbma_tables.quantities.leakage import Leakage
+    from mbma_tables.contacts.quantities.leakage import Leakage
     from mbma_tables.theories.yielding.theory import Loaded
 
 # what yields depends on the heaviest load before: none is assumed, also where pressures of
@@ -311,7 +311,7 @@ class Contact(State, Displayed):
     @functools.cached_property
     def leakage(self) -> Leakage:
         """Flow through the gaps of the contact; computed when first read."""
-        from mbma_tables.quantities.leakage import leakage_of
+        from mbma_tables.contacts.quantities.leakage import leakage_of
 
         return leakage_of(self)
 
@@ -349,7 +349,7 @@ class Contact(State, Displayed):
     ) -> Numbers:
         """Conductance per nominal area of a gas in the gaps, parallel to `solid_conductance` of the solid [W/(m^2 K)].
 
-        The law, data of gases and their accuracy are in `mbma_tables.quantities.gas`;
+        The law, data of gases and their accuracy are in `mbma_tables.contacts.quantities.gas`;
         without radiation.
 
         Parameters
@@ -370,7 +370,7 @@ class Contact(State, Displayed):
         >>> f"{pressed.solid_conductance:.0f} W/(m^2 K) and {pressed.gap_conductance('air'):.0f}"
         '3345 W/(m^2 K) and 9921'
         """
-        from mbma_tables.quantities.conductances import conductance_of_gas
+        from mbma_tables.contacts.quantities.conductances import conductance_of_gas
 
         in_gaps = Gas(gas, temperature, gas_pressure, accommodation)
         conductance: Numbers = conductance_of_gas(self, in_gaps)

@@ -10,23 +10,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbma_tables import __version__
-from mbma_tables.bodies import Bodies
+from mbma_tables.bodies.bodies import Bodies
+from mbma_tables.bodies.materials import ELASTIC_PSI
 from mbma_tables.common.arguments import FloatArray, Numbers, number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor, in_unit
 from mbma_tables.contacts.contact import contact
+from mbma_tables.contacts.law import block as at
+from mbma_tables.contacts.law.law import ContactLaw
+from mbma_tables.contacts.law.leakage import LeakageLaw
+from mbma_tables.contacts.law.make import law_of
+from mbma_tables.contacts.quantities.conductances import conductance_of_gas
+from mbma_tables.contacts.quantities.gas import VACUUM
+from mbma_tables.contacts.quantities.interface import NOTHING_BETWEEN, Gas, Interface
+from mbma_tables.effects.force_law import ForceLaw
+from mbma_tables.effects.rough_contact import pressed
 from mbma_tables.export.text import about, number
 from mbma_tables.islands.variants import Variant
-from mbma_tables.law import block as at
-from mbma_tables.law.law import ContactLaw
-from mbma_tables.law.leakage import LeakageLaw
-from mbma_tables.law.make import law_of
-from mbma_tables.materials import ELASTIC_PSI
-from mbma_tables.quantities.conductances import conductance_of_gas
-from mbma_tables.quantities.gas import VACUUM
-from mbma_tables.quantities.interface import NOTHING_BETWEEN, Gas, Interface
-from mbma_tables.rough_body.force_law import ForceLaw
-from mbma_tables.rough_body.rough_contact import pressed
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import resolve

@@ -7,11 +7,17 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.units import factor
+from mbma_tables.contacts.law import block as at
+from mbma_tables.contacts.law.block import (
+    Side,
+    assemble,
+    first_record,
+    power_record,
+    side_pieces,
+)
+from mbma_tables.contacts.quantities.gas import jump_of
 from mbma_tables.core import core
 from mbma_tables.export.exported_law import ExportedLaw, GasInGaps
-from mbma_tables.law import block as at
-from mbma_tables.law.block import Side, assemble, first_record, power_record, side_pieces
-from mbma_tables.quantities.gas import jump_of
 
 # tolerances of the polynomials, relative to the value there and that at first contact:
 # the first that can be met, coarser ones of simulated maps, whose answers have kinks

@@ -8,13 +8,15 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from mbma_tables import __version__
-from mbma_tables.bodies import Bodies
+from mbma_tables.bodies.bodies import Bodies
 from mbma_tables.common.arguments import nearest, require_flag
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor
+from mbma_tables.contacts.quantities.gas import VACUUM
+from mbma_tables.contacts.quantities.interface import Gas, Interface
+from mbma_tables.export.code.languages import LANGUAGES
 from mbma_tables.export.exported_law import GasInGaps
-from mbma_tables.export.languages import LANGUAGES
-from mbma_tables.export.law_rows import describe_law
+from mbma_tables.export.rows.law_rows import describe_law
 from mbma_tables.export.targets import (
     AGAINST,
     CONDUCTANCES,
@@ -22,8 +24,6 @@ from mbma_tables.export.targets import (
     require_quantity,
     targets,
 )
-from mbma_tables.quantities.gas import VACUUM
-from mbma_tables.quantities.interface import Gas, Interface
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import Theory
 

@@ -12,9 +12,9 @@ from typing import Any
 from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
+from mbma_tables.contacts.quantities.registry import registry
 from mbma_tables.export.law_table import LawTable
 from mbma_tables.export.text import checked_name, comment
-from mbma_tables.quantities.registry import registry
 
 LAW = frozenset(
     {"theory", "variant", "hardness", "conductivity", "conductivity_unit", "kappa"}
@@ -24,11 +24,11 @@ CODE = LAW | {"name", "leakage", "direction"}
 FRICTION = {"kappa", "friction", "friction_pressure"}
 # groups by the modules that declare them, in the order in which help lists them
 GROUPS = {
-    "SOLVERS": "solvers",
-    "DATA": "data",
-    "LAWS": "law_code",
-    "FMUS": "fmu",
-    "CODE": "c_code",
+    "SOLVERS": "rows.solvers",
+    "DATA": "rows.data",
+    "LAWS": "code.law_code",
+    "FMUS": "code.fmu",
+    "CODE": "model.c_code",
 }
 SI = ("m", "Pa")
 STAY_WITHIN_ROWS = (

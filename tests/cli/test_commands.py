@@ -14,9 +14,9 @@ from click.testing import CliRunner
 from helpers import run, told
 
 from mbma_tables import Bodies, Surface, contact, island
+from mbma_tables.bodies.materials import effective_modulus
 from mbma_tables.cli import main
-from mbma_tables.materials import effective_modulus
-from mbma_tables.scenes.specimen import MAP_OPTIONS, MATERIAL, NUMBERS, schema
+from mbma_tables.design.scenes.specimen import MAP_OPTIONS, MATERIAL, NUMBERS, schema
 from mbma_tables.theories import THEORIES, Mbma
 
 YANG_PERSSON = {

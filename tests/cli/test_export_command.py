@@ -12,7 +12,8 @@ import pytest
 from click.testing import CliRunner
 
 from mbma_tables.cli import main
-from mbma_tables.export import CODE, c_code
+from mbma_tables.export import CODE
+from mbma_tables.export.model import c_code
 from mbma_tables.export.targets import ROWS, targets
 
 LAW = [

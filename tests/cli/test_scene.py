@@ -7,7 +7,12 @@ import pytest
 import xarray
 from helpers import refused, run, told
 
-from mbma_tables.scenes.plan import UNIT, Distance, shipped_costs, shipped_distances
+from mbma_tables.design.scenes.plan import (
+    UNIT,
+    Distance,
+    shipped_costs,
+    shipped_distances,
+)
 
 JOINT = str(pathlib.Path(__file__).parents[2] / "examples" / "scene_joint.toml")
 ROAD = str(pathlib.Path(__file__).parents[2] / "examples" / "scene_road.toml")

@@ -19,10 +19,10 @@ from mbma_tables import (
     contact,
     contact_law,
 )
-from mbma_tables.bodies import mean_conductivity
-from mbma_tables.materials import tangential_ratio
-from mbma_tables.quantities.conductances import cooper_mikic_yovanovich
-from mbma_tables.quantities.gas import R, jump_of, mean_inverse
+from mbma_tables.bodies.bodies import mean_conductivity
+from mbma_tables.bodies.materials import tangential_ratio
+from mbma_tables.contacts.quantities.conductances import cooper_mikic_yovanovich
+from mbma_tables.contacts.quantities.gas import R, jump_of, mean_inverse
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.simulated.boundary_elements import Contact
 

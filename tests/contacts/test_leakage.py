@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from mbma_tables import Bodies, Surface, contact, contact_law
 from mbma_tables.common.errors import InputError, OutOfRangeError
-from mbma_tables.quantities import effective_medium as leakage
-from mbma_tables.quantities.leakage import flow, flow_of_spectrum, shipped_flow
+from mbma_tables.contacts.quantities import effective_medium as leakage
+from mbma_tables.contacts.quantities.leakage import flow, flow_of_spectrum, shipped_flow
 from mbma_tables.theories.calibrated.formulas import Spectrum
 from mbma_tables.theories.evidence import shipped_part
 

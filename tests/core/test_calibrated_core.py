@@ -10,9 +10,9 @@ from scipy.interpolate import NdBSpline
 from scipy.special import erf
 
 from mbma_tables import ConvergenceError, InputError
+from mbma_tables.contacts.quantities import leakage
+from mbma_tables.contacts.quantities.leakage import shipped_flow
 from mbma_tables.core import GENERATIONS, core
-from mbma_tables.quantities import leakage
-from mbma_tables.quantities.leakage import shipped_flow
 from mbma_tables.theories.calibrated.formulas import (
     CONSTANTS,
     LAW_ERROR,

@@ -231,13 +231,13 @@ LONG = {
         "flow_conductance(gap, (1.0, 1.0))",
     ),
     "gas conductance": (
-        "from mbma_tables.quantities.gas import mean_inverse\nshare = np.linspace(1e-3, 0.1, u.size)",
+        "from mbma_tables.contacts.quantities.gas import mean_inverse\nshare = np.linspace(1e-3, 0.1, u.size)",
         "mean_inverse(u, share, 0.3, 1.0)",
     ),
     "energy": ("", "contact(one, mean_separation=u[::10], theory='persson').energy"),
     "flow factors": (
-        "from mbma_tables.quantities.effective_medium import FlowConstants\n"
-        "from mbma_tables.quantities.lay import factors\n"
+        "from mbma_tables.contacts.quantities.effective_medium import FlowConstants\n"
+        "from mbma_tables.contacts.quantities.lay import factors\n"
         "gaps, share = u[::300], np.full(u[::300].shape, 0.02)",
         "factors(gaps, share, 3.0, FlowConstants())",
     ),

@@ -10,7 +10,7 @@ import pytest
 from helpers import law_of_names
 
 from mbma_tables import ContactLaw, Surface
-from mbma_tables.export.law_code import law_text
+from mbma_tables.export.code.law_code import law_text
 
 PLAIN = (
     "calculix",

@@ -17,9 +17,16 @@ from law_points import PLAIN, needs
 
 import mbma_tables.core
 from mbma_tables import InputError, Surface, __version__
-from mbma_tables.export import c_code, conformance, data, solvers
-from mbma_tables.export.c_code import SELFTEST, SOURCES, check, read_report, write_code
-from mbma_tables.export.law_rows import describe_law
+from mbma_tables.export.model import c_code, conformance
+from mbma_tables.export.model.c_code import (
+    SELFTEST,
+    SOURCES,
+    check,
+    read_report,
+    write_code,
+)
+from mbma_tables.export.rows import data, solvers
+from mbma_tables.export.rows.law_rows import describe_law
 from mbma_tables.export.text import checked_name
 from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.tables.open import universal_model

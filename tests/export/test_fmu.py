@@ -11,7 +11,7 @@ from helpers import refusals
 from law_points import ASKED, CONDUCTIVITY, KAPPA, needs, points
 
 from mbma_tables import InputError
-from mbma_tables.export.fmu import fmu
+from mbma_tables.export.code.fmu import fmu
 
 HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
 QUANTITIES = [

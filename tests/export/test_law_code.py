@@ -20,9 +20,9 @@ from law_points import ASKED, CONDUCTIVITY, KAPPA, VALUES, needs, points
 from mbma_tables import Surface, contact
 from mbma_tables.core import core
 from mbma_tables.export import LAWS
-from mbma_tables.export.core_code import core_text
-from mbma_tables.export.languages import LANGUAGES
-from mbma_tables.export.law_code import asked_law, law_files, law_text, text_of
+from mbma_tables.export.code.core_code import core_text
+from mbma_tables.export.code.languages import LANGUAGES
+from mbma_tables.export.code.law_code import asked_law, law_files, law_text, text_of
 from mbma_tables.export.text import core_file
 
 SUBROUTINES = [target for target, language in LANGUAGES.items() if language.subroutine]

@@ -11,9 +11,10 @@ from helpers import refusals
 from law_points import PLAIN
 
 from mbma_tables import Bodies, InputError, MbmaError, Surface, contact, contact_law
-from mbma_tables.export import data, law_table, solvers
-from mbma_tables.export.law_rows import FLOOR, describe_law
-from mbma_tables.export.solvers import calculix
+from mbma_tables.export import law_table
+from mbma_tables.export.rows import data, solvers
+from mbma_tables.export.rows.law_rows import FLOOR, describe_law
+from mbma_tables.export.rows.solvers import calculix
 from mbma_tables.islands.variants import PRINTED
 from mbma_tables.theories import THEORIES, Mbma
 

@@ -19,11 +19,12 @@ from law_points import needs
 
 from mbma_tables import InputError, MbmaError, Surface, contact, contact_law
 from mbma_tables.cli import main
-from mbma_tables.export import LAWS, data
-from mbma_tables.export.fmu import fmu
-from mbma_tables.export.languages import LANGUAGES
-from mbma_tables.export.law_code import asked_law, text_of
-from mbma_tables.export.law_rows import describe_law
+from mbma_tables.export import LAWS
+from mbma_tables.export.code.fmu import fmu
+from mbma_tables.export.code.languages import LANGUAGES
+from mbma_tables.export.code.law_code import asked_law, text_of
+from mbma_tables.export.rows import data
+from mbma_tables.export.rows.law_rows import describe_law
 from mbma_tables.export.text import inert
 from mbma_tables.islands.variants import get_variant
 
@@ -216,7 +217,7 @@ def quickly_made(monkeypatch):
     """Laws that differ in their names alone are made once."""
     made = plain()
     monkeypatch.setattr(
-        "mbma_tables.export.law_code.asked_law",
+        "mbma_tables.export.code.law_code.asked_law",
         lambda *_, name, **__: made._replace(name=name),
     )
 

@@ -12,8 +12,8 @@ from click.testing import CliRunner
 
 from mbma_tables import InputError, Surface, contact, greenwood_tripp
 from mbma_tables.cli import main
-from mbma_tables.export import own_formula
-from mbma_tables.export.own_formula import (
+from mbma_tables.export.model import own_formula
+from mbma_tables.export.model.own_formula import (
     EXAMPLE,
     Range,
     Samples,
@@ -251,6 +251,6 @@ def test_terms_and_files_are_checked():
 
 
 def test_scikit_learn_is_imported_when_a_formula_is_fitted():
-    code = "import sys, mbma_tables.cli, mbma_tables.export.own_formula\n"
+    code = "import sys, mbma_tables.cli, mbma_tables.export.model.own_formula\n"
     code += "assert 'sklearn' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)

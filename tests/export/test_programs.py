@@ -9,9 +9,9 @@ import pytest
 from law_points import needs
 
 from mbma_tables import Surface, contact, contact_law
-from mbma_tables.export import solvers
-from mbma_tables.export.data import matlab_reader, to_csv, to_matlab, to_netcdf
-from mbma_tables.export.law_rows import describe_law
+from mbma_tables.export.rows import solvers
+from mbma_tables.export.rows.data import matlab_reader, to_csv, to_matlab, to_netcdf
+from mbma_tables.export.rows.law_rows import describe_law
 
 CONDUCTIVITY = 50.0  # mW/(mm K)
 MAPS = pathlib.Path(__file__).parents[2] / "docs" / "data" / "maps"

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from generate import audit
 from generate import audit_routes as routes
 from mbma_tables import InputError
+from mbma_tables.bodies.materials import METALS
 from mbma_tables.common.errors import MbmaError
-from mbma_tables.materials import METALS
 
 
 @pytest.mark.parametrize("what", audit.BOUNDS)

@@ -20,8 +20,8 @@ from generate.calibrated import (
 )
 from generate.calibrated_file import QUANTITIES, write_part
 from mbma_tables.common.errors import TableFileError
-from mbma_tables.data import read_groups
 from mbma_tables.theories.calibrated.formulas import CONSTANTS, Law, Spectrum
+from mbma_tables.theories.dataset import read_groups
 
 FORCES = np.geomspace(4e-4, 1.0, 15)
 TRUE = dataclasses.replace(

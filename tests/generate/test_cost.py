@@ -9,8 +9,8 @@ from generate.boundary_elements.run import GRIDS
 from generate.files import ROOT, read_csv
 from generate.pages import cost as pages_cost
 from mbma_tables import contact
+from mbma_tables.design.scenes.plan import read_costs, shipped_costs, shipped_distances
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.scenes.plan import read_costs, shipped_costs, shipped_distances
 from mbma_tables.theories import Mbma
 
 COST = 2.0

@@ -15,8 +15,8 @@ from hypothesis.extra.numpy import mutually_broadcastable_shapes
 
 from generate.machined.makers import rough
 from mbma_tables import Bodies, InputError, OutOfRangeError, Surface, contact, contact_law
-from mbma_tables.export.law_rows import describe_law
-from mbma_tables.quantities.leakage import shipped_flow
+from mbma_tables.contacts.quantities.leakage import shipped_flow
+from mbma_tables.export.rows.law_rows import describe_law
 from mbma_tables.surfaces.averages import average
 from mbma_tables.surfaces.heights import SHARES, Heights
 from mbma_tables.surfaces.maps import extrapolated

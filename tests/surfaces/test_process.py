@@ -11,7 +11,7 @@ from helpers import run
 
 from mbma_tables import Bodies, InputError, Joint, Surface, contact, contact_law
 from mbma_tables.common.files import shipped_file
-from mbma_tables.contacts.sensitivity import sensitivity
+from mbma_tables.design.sensitivity import sensitivity
 
 DRAWING = {"Ra": "1.6 um", "hurst": 0.8, "longest": "250 um", "shortest": "4 um"}
 AREA = "4 cm^2"

@@ -12,7 +12,7 @@ from small_tables import small_table
 
 from mbma_tables.cli import main
 from mbma_tables.common.errors import InputError
-from mbma_tables.export.c_code import write_code
+from mbma_tables.export.model.c_code import write_code
 from mbma_tables.tables.open import open_table
 from mbma_tables.tables.writer import write_table
 

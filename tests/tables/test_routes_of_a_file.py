@@ -10,7 +10,7 @@ from small_tables import small_table
 from mbma_tables import Scene, Surface, contact, contact_law, island
 from mbma_tables.cli import main
 from mbma_tables.common.errors import InputError, TableFileError
-from mbma_tables.scenes.plan import certified_error
+from mbma_tables.design.scenes.plan import certified_error
 from mbma_tables.tables.open import open_table
 from mbma_tables.tables.writer import write_table
 from mbma_tables.theories import Mbma

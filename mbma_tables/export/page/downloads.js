@@ -109,7 +109,7 @@ function commandOf(state) {
   );
   const units = `${LENGTH ? ` --length-unit ${LENGTH}` : ""}${STRESS && !OVER_E ? ` --stress-unit ${STRESS}` : ""}`;
   return state.samples
-    ? "mbma_tables.export.law_code.law_text of Surface.from_spectrum(q, C, h_max)"
+    ? "mbma_tables.export.code.law_code.law_text of Surface.from_spectrum(q, C, h_max)"
     : `mbma export c-law ${numbers.join(" ")}${Number.isFinite(state.hardness) ? ` --hardness ${state.hardness}` : ""}${units} --theory ${state.theory}${state.theory === "mbma" ? ` --variant ${state.variant}` : ""} --out law.c`;
 }
 

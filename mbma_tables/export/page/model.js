@@ -14,7 +14,7 @@ function bytesOf(text) {
   return bytes;
 }
 
-// Undoes `packed` of export/explorer.py: the bytes of a table.
+// Undoes `packed` of export/page/explorer.py: the bytes of a table.
 async function unpacked({ count, bytes: size, differences, text }) {
   const stream = new Blob([bytesOf(text)]).stream().pipeThrough(new DecompressionStream("deflate"));
   const planes = new Uint8Array(await new Response(stream).arrayBuffer());

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from mbma_tables import InputError, OutOfRangeError, Surface
-from mbma_tables.bodies import mean_conductivity
-from mbma_tables.quantities.effective_medium import FlowConstants
-from mbma_tables.quantities.gas import mean_inverse
-from mbma_tables.quantities.lay import factors
+from mbma_tables.bodies.bodies import mean_conductivity
+from mbma_tables.contacts.quantities.effective_medium import FlowConstants
+from mbma_tables.contacts.quantities.gas import mean_inverse
+from mbma_tables.contacts.quantities.lay import factors
 from mbma_tables.theories.calibrated.formulas import self_affine_law
 
 COUNT = 20_000

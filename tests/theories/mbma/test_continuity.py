@@ -13,11 +13,11 @@ from catalogue import LEVEL, OWN
 from helpers import SCALE, difference_weights, with_slopes
 
 from mbma_tables import Surface, contact_law, greenwood_tripp
+from mbma_tables.contacts.law.block import CENTRE, RATE
 from mbma_tables.core import core
 from mbma_tables.islands.geometry import kinks
 from mbma_tables.islands.greenwood_tripp import height_integral
 from mbma_tables.islands.variants import VARIANTS, get_variant
-from mbma_tables.law.block import CENTRE, RATE
 from mbma_tables.tables.open import universal_model
 from mbma_tables.theories import Mbma
 

@@ -1,0 +1,1 @@
+"""What is pressed together: metals, moduli, hardness, conductivities."""

@@ -1,0 +1,514 @@
+"""Leakage of a contact: flow coefficient with uncertainty, by a table of the effective medium, and leakage rates."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.common.arguments import (
+    FloatArray,
+    Numbers,
+    finite_array,
+    is_labelled,
+    positive_array,
+    rows,
+)
+from mbma_tables.common.display import Displayed, Variable, shown
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.interrupts import in_blocks
+from mbma_tables.common.plots import draw_compression, leakage_label, pressure_label
+from mbma_tables.common.shared import shared, shared_property
+from mbma_tables.common.units import Dimension
+from mbma_tables.contacts.quantities.effective_medium import (
+    LARGEST_AREA,
+    FlowConstants,
+    contact_factor,
+    wide_gap,
+)
+from mbma_tables.contacts.quantities.registry import DIMENSIONLESS, on_request, quantity
+from mbma_tables.contacts.quantities.state import State
+from mbma_tables.contacts.quantities.validity import reasons_with_masks, valid_where_none
+from mbma_tables.core import core
+from mbma_tables.surfaces.any_surface import agree
+from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.theories.base import Theory
+from mbma_tables.theories.calibrated.formulas import (
+    Spectrum,
+    self_affine_law,
+    spectrum_of,
+)
+from mbma_tables.theories.evidence import (
+    Owners,
+    SurfaceSpline,
+    known_at,
+    nodes_of,
+    shipped_part,
+)
+
+GROUP = "leakage"
+AXES = ("hurst", "log_zeta_1", "log_odds")
+COVERED = np.array(
+    [[0.1, 1.0], [math.log(3.0), math.log(1e5)]]
+)  # H and ln zeta_1, where the error was measured
+FEW = 8192  # entries per block, so that a block fits into the processor's cache
+LEAST = 1e-300  # smaller contact fractions count as zero
+OWN_NODES = 64  # contact fractions at which a spectrum's own factor is found
+KEPT = 64  # spectra whose factors are kept
+# standard deviations of ln k of maps by their isotropic spectrum, which come on top, of
+# maps that are valid for the calibrated law and of others; at these contacts of the data
+# set's group machined
+MAP_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39)
+LIKE_GAUSSIAN = (0.29, 0.60, 0.89, 1.9, 6.3)
+OTHERS = (0.84, 1.3, 1.9, 3.0, 7.3)
+SIMULATED = 64.0  # zeta_1 up to which flow was simulated
+# yielded share of the contact up to which its flow is that of the elastic contact: gap and
+# area differ by less than this share, the scatter of flow is at least forty times as large
+NEGLIGIBLE_YIELD = 1e-3
+MEANINGS = {
+    "K": "flow coefficient",
+    "x": "flow coefficient along the first axis",
+    "y": "flow coefficient along the second axis",
+    "xy": "flow coefficient of flow along one axis by pressure along the other",
+    "hydraulic_aperture": "K^(1/3)",
+    "flow_factor": "K over the cube of the mean separation",
+    "scatter": "model uncertainty: standard deviation of ln K",
+    "valid": "whether flow through such contacts was simulated",
+    "blocked": "whether contact percolates",
+}
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Leakage(Displayed):
+    """Flow through the gaps of a contact; arrays of the contact's shape.
+
+    Reynolds' equation on the gaps: no flow where bodies touch, small slopes, isotropic
+    roughness, and a fluid whose pressure does not move the solids. It is the mean of a long
+    seal, many of the longest wavelengths each way; cells of a few wavelengths differ by
+    `scatter`. Flow per length of seal is K (p1 - p2)/(12 viscosity width). With
+    ``theory="simulated"`` K is the geometric mean of both axes, else that of isotropic
+    roughness on both.
+    """
+
+    #: flow coefficient [length^3], the cube of the `hydraulic_aperture`; exactly 0 where
+    #: `blocked`, and NaN where the elastic contact at this gap would be blocked but the
+    #: contact yields, so that compact patches leave channels
+    K: Numbers
+    x: Numbers  #: that along the first axis of the map [length^3]
+    y: Numbers  #: along the second axis
+    #: flow per width along one axis by a pressure gradient along the other; 0 where
+    #: isotropic
+    xy: Numbers
+    _contact: Any = dataclasses.field(repr=False)
+
+    def _facts(self) -> dict[str, str]:
+        known = {
+            name: shown(value, unit)
+            for name, (value, unit, *_) in self._variables().items()
+        }
+        return {"theory": self._contact.theory, **known}
+
+    def _variables(self) -> dict[str, Variable]:
+        units = dict.fromkeys(("x", "y", "xy"), self.units["K"]) | self.units
+        return {
+            n: Variable(getattr(self, n), units.get(n, "1"), meaning)
+            for n, meaning in MEANINGS.items()
+        }
+
+    def _origin(self) -> Any:
+        return self._contact._origin()
+
+    def _figure(self) -> Any:
+        return draw_compression(
+            [self._contact.curve(leakage=True)],
+            pressure_label=pressure_label(self._contact.units["pressure"]),
+            leakage_label=leakage_label(self.units["K"]),
+        )
+
+    blocked = property(
+        lambda self: self.K == 0,
+        doc="Whether contact percolates, A/A0 at or above about 0.41; False where K is not known.",
+    )
+
+    def along(self, direction: ArrayLike | str) -> Any:
+        """Flow coefficient of a long seal whose width is along "x", "y" or degrees from x [length^3].
+
+        K_x cos^2 + K_y sin^2 + 2 K_xy sin cos: pressure falls along the width alone.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact
+        >>> seal = Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5, unit="um")
+        >>> found = contact(seal, "10 MPa", area=0.1, theory="calibrated").leakage
+        >>> bool(abs(found.along(30.0) / found.K - 1) < 1e-12)
+        True
+        """
+        return along(direction, self.x, self.y, self.xy)
+
+    #: K^(1/3) [length], the gap of parallel plates with the same flow
+    hydraulic_aperture = property(lambda self: np.cbrt(self.K))
+    #: K/u^3, Patir and Cheng's pressure flow factor of the mean separation u
+    flow_factor = property(lambda self: self.K / self._contact.mean_separation**3)
+
+    @shared_property
+    def scatter(self) -> Any:
+        """Model uncertainty, one standard deviation of ln K, of cells at least four longest wavelengths wide.
+
+        NaN where not known, and where blocked.
+        """
+
+        @np.errstate(divide="ignore")
+        def stated(
+            by: Theory, surface: Any, u: FloatArray, E: FloatArray, area: FloatArray
+        ) -> tuple[FloatArray]:
+            simulated = _simulated(by)
+            if simulated is not None:
+                return (simulated.flow_trust(surface, u, area)[0],)
+            stated = shipped_flow().standard_deviation(by.elastic.name, area)
+            if not isinstance(surface, MeasuredSurface) or surface.bearing is None:
+                return (stated,)
+            # channels and walls of a map are not in its spectrum
+            of_maps = LIKE_GAUSSIAN if not surface.departures(by_map=True) else OTHERS
+            return (
+                np.hypot(stated, np.interp(np.log(area), np.log(MAP_AREAS), of_maps)),
+            )
+
+        return self._contact.evaluate(stated, 1, {"area": self._contact.area})[0]
+
+    @shared_property
+    def valid(self) -> Any:
+        """Whether flow through such contacts was simulated; if not, `reasons` explains why."""
+        contact = self._contact
+        return contact.valid & valid_where_none(
+            contact, reasons_against, {"area": contact.area}
+        )
+
+    @shared_property
+    def reasons(self) -> Any:
+        """Reasons why entries are not valid, each with its mask; for plain arrays."""
+        contact = self._contact
+        return contact.reasons | reasons_with_masks(
+            contact, reasons_against, {"area": contact.area}
+        )
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the quantities that are not dimensionless."""
+        units = self._contact.unit_system
+        return {
+            "K": flow_coefficient.unit_in(units),
+            "hydraulic_aperture": hydraulic_aperture.unit_in(units),
+        }
+
+    def liquid(
+        self,
+        viscosity: ArrayLike | str,
+        pressure_drop: ArrayLike | str,
+        width: ArrayLike | str,
+    ) -> Any:
+        """Volume that leaks per time and length of seal [length^2/time], K (p1 - p2)/(12 viscosity width).
+
+        Parameters
+        ----------
+        viscosity : array_like or str
+            Dynamic viscosity [stress time], such as "1e-3 Pa s"; a number is in the
+            modulus's unit of stress times the unit of time that the result then has.
+        pressure_drop : array_like or str
+            p1 - p2 [stress].
+        width : array_like or str
+            Of the seal, along the flow [length].
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            For numbers that are not positive and finite, and units that cannot be converted.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact
+        >>> seal = Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5, unit="um")
+        >>> found = contact(seal, "10 MPa", area=0.1, theory="calibrated").leakage
+        >>> f"{found.liquid('1e-3 Pa s', '0.1 MPa', '2 mm'):.1e} um^2/s"
+        '3.0e+02 um^2/s'
+        """
+        found: dict[str, Any] = {
+            "viscosity": viscosity,
+            "pressure_drop": pressure_drop,
+            "width": width,
+        }
+        for name, value in found.items():
+            if name == "viscosity" and isinstance(value, str):
+                value, stress, seconds = value.strip().rpartition(" ")
+                if seconds != "s" or not stress:
+                    raise InputError(
+                        f"viscosity = {viscosity!r} must be a stress times seconds, such as '1e-3 Pa s'"
+                    )
+            number = self._contact.unit_system.number(name, value)
+            array = positive_array(name, number)
+            found[name] = number if is_labelled(number) else array
+        agree(K=self.K, **found)
+        return self.K * (
+            found["pressure_drop"] / (12 * found["viscosity"] * found["width"])
+        )
+
+
+def leakage_of(contact: Any) -> Leakage:
+    """The leakage of a contact."""
+
+    def answer(
+        theory: Theory, surface: Any, u: FloatArray, E: FloatArray, share: FloatArray
+    ) -> tuple[FloatArray, ...]:
+        simulated = _simulated(theory)
+        if simulated is not None:
+            own = np.asarray(simulated.flow(surface, u))
+            if simulated is not theory:
+                own = unknown_where_blocked(own, yields_noticeably(theory, surface, u))
+            return np.sqrt(own[0]) * np.sqrt(own[1]), *own
+        K = flow(surface, u, share) * np.asarray(surface.h_rms) ** 3
+        K = unknown_where_blocked(K, yields_noticeably(theory, surface, u))
+        return K, K, K, np.zeros_like(K)
+
+    K, x, y, xy = contact.evaluate(answer, 4, {"area": contact.area})
+    return Leakage(K, x, y, xy, contact)
+
+
+def yields_noticeably(theory: Any, surface: Any, u: FloatArray) -> Any:
+    """Mask of contacts of which more than a negligible share yields; False of an elastic theory."""
+    if theory.elastic is theory:
+        return np.zeros(np.shape(u), bool)
+    return np.asarray(theory.loaded(surface, u).yielded > NEGLIGIBLE_YIELD)
+
+
+def unknown_where_blocked(K: FloatArray, yields: Any) -> FloatArray:
+    """Flow coefficients, NaN where the contact yields and the elastic contact would be blocked."""
+    return np.where((K == 0) & yields, np.nan, K)
+
+
+def _simulated(theory: Theory) -> Any:
+    """The theory of simulated gaps, yielded ones where these are simulated, else the elastic contact's, if any."""
+    return next(
+        (one for one in (theory, theory.elastic) if hasattr(one, "flow_trust")), None
+    )
+
+
+def degrees(direction: ArrayLike | str) -> FloatArray:
+    """Degrees from the first axis of "x", "y" or numbers."""
+    if isinstance(direction, str):
+        try:
+            direction = float({"x": "0", "y": "90"}.get(direction, direction))
+        except ValueError:
+            raise InputError(
+                f"direction must be 'x', 'y' or degrees from x, got {direction!r}"
+            ) from None
+    return finite_array("direction", direction)
+
+
+def along(direction: ArrayLike | str, x: Any, y: Any, xy: Any) -> Any:
+    """Flow coefficient in a direction, "x", "y" or degrees from x."""
+    angle = np.deg2rad(degrees(direction))
+    # zero across the axes, which may be blocked
+    cos, sin = np.round([np.cos(angle), np.sin(angle)], 15)
+    return x * cos**2 + y * sin**2 + 2 * xy * sin * cos
+
+
+def reasons_against(
+    theory: Theory, surface: Any, u: FloatArray, E_star: Any, area: FloatArray
+) -> dict[str, Any]:
+    """Reasons why the flow is not valid, in addition to those for the contact."""
+    simulated = _simulated(theory)
+    everywhere = np.ones(np.shape(area), bool)
+    if simulated is not None:
+        found = dict(simulated.flow_trust(surface, u, area)[1])
+    else:
+        many = f"leakage: A/A0 is above {LARGEST_AREA:g}, where cells of one spectrum differ by factors"
+        far = f"leakage: the longest wavelength is more than {SIMULATED:g} times the shortest, beyond simulated flow"
+        found = {
+            many: area > LARGEST_AREA,
+            far: everywhere & (np.asarray(surface.zeta_1) > SIMULATED),
+        }
+    if (
+        simulated is None
+        and isinstance(surface, MeasuredSurface)
+        and surface.bearing is not None
+    ):
+        spectrum = (
+            "leakage: channels and walls of a map are not in its isotropic spectrum"
+        )
+        found[f"{spectrum}: theory='simulated' has its flow"] = everywhere
+    if theory.elastic is not theory is not simulated:
+        found["leakage: yielded contacts leak several times more"] = yields_noticeably(
+            theory, surface, u
+        )
+    for reason in theory.reasons_of_flow():
+        found[reason] = everywhere
+    return found
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FlowTable(SurfaceSpline):
+    """The group `leakage` of the shipped file: ln R."""
+
+    constants: FlowConstants
+    error: float  # largest error of ln R against the medium itself, at held-out surfaces
+    scatter: dict[str, FloatArray]  # by theory: root mean squares of ln(k/simulation)
+    contact: FloatArray  # at these contact fractions
+
+    def flow(
+        self, surfaces: FloatArray, owner: Owners, u: FloatArray, area: FloatArray
+    ) -> FloatArray:
+        """k of mean gaps [h_rms] and contact fractions; 0 where blocked. Columns of `surfaces`: H, ln zeta_1."""
+        given = *self.core_table, *surfaces, None, None, self.shared(surfaces, u.size)
+        return _flow(given, owner, u, area)
+
+    def standard_deviation(self, theory: str, area: FloatArray) -> FloatArray:
+        """Root mean square of ln(k/simulation) at contact fractions; NaN where not known or blocked."""
+        row = self.scatter.get(theory)
+        if row is None or not np.isfinite(row).any():
+            return np.full(np.shape(area), np.nan)
+        return np.where(
+            np.asarray(area) < self.constants.threshold,
+            known_at(self.contact, row, area),
+            np.nan,
+        )
+
+
+@shared()
+def shipped_flow() -> FlowTable:
+    """The shipped table, read once."""
+    values, facts = shipped_part(GROUP)
+    constants = FlowConstants(
+        *(float(facts[f"flow_{f.name}"]) for f in dataclasses.fields(FlowConstants))
+    )
+    return FlowTable(
+        *nodes_of([values[name] for name in AXES]),
+        COVERED,
+        values["spline"],
+        (constants.threshold, constants.obstruction, 0.0),
+        constants,
+        float(facts["largest_error_log_factor"]),
+        dict(zip(facts["theories"].split(), values["stated_scatter"], strict=True)),
+        values["contact"],
+    )
+
+
+@np.errstate(all="ignore")
+def _flow(
+    given: tuple[Any, ...], owner: Owners, u: FloatArray, area: FloatArray
+) -> FloatArray:
+    """u^3 (1 - 1.5/(u^2 + 4)) R, and 0 from A/A0 = threshold on; ln R over ln A/(threshold A0 - A)."""
+    # below the table ln R is in proportion to A^obstruction, above it R is a power of
+    # threshold - A/A0
+    numbers = given[1]
+    found = np.empty(u.shape)
+    threshold = numbers[10]
+    obstruction = numbers[11]
+    first = numbers[2]
+    last = first + given[2][2] / numbers[5]
+
+    def fill(k: slice) -> None:
+        # contact fractions of Greenwood and Williamson exceed 1
+        a = area[k]
+        odds = np.log(np.maximum(a, LEAST) / np.maximum(threshold - a, LEAST))
+        value, slope = np.empty((2, odds.size))
+        core.spline_values(*given, owner[k], odds, value, slope)
+        unknown = np.isnan(u[k]) | np.isnan(value)
+        value += slope * np.maximum(odds - last, 0.0)
+        log_factor = np.minimum(
+            value * np.exp(obstruction * np.minimum(odds - first, 0.0)), 0.0
+        )
+        wide = u[k] * u[k] * u[k] * wide_gap(u[k]) * np.exp(log_factor)
+        found[k] = np.where(unknown, np.nan, np.where(a < threshold, wide, 0.0))
+
+    in_blocks(fill, u.size, FEW)
+    return found
+
+
+@shared(KEPT)
+def own_factor(spectrum: Spectrum) -> tuple[Any, ...]:
+    """ln R over the table's odds of one spectrum, as `core.flow` takes it."""
+    from scipy.interpolate import PchipInterpolator
+
+    table = shipped_flow()
+    odds, step = np.linspace(table.first[2], table.last, OWN_NODES, retstep=True)
+    log_factor = contact_factor(
+        spectrum, table.constants.threshold / (1 + np.exp(-odds)), table.constants
+    )
+    cubics = PchipInterpolator(
+        odds, np.minimum.accumulate(np.minimum(log_factor, 0.0))
+    ).c[::-1]
+    pieces = np.zeros((OWN_NODES - 1, 6))
+    pieces[:, :4] = (cubics * step ** np.arange(4)[:, None]).T
+    numbers = table.core_table[1].copy()
+    numbers[5] = 1 / step
+    anything = np.zeros(1)
+    return (
+        None,
+        numbers,
+        np.array([1, 1, OWN_NODES - 1]),
+        anything,
+        anything,
+        None,
+        None,
+        pieces,
+    )
+
+
+def flow_of_spectrum(spectrum: Spectrum, u: FloatArray, area: FloatArray) -> FloatArray:
+    """k of mean gaps [h_rms] and contact fractions of one spectrum; 0 where blocked."""
+    return _flow(own_factor(spectrum), np.zeros(u.size, np.int64), u, area)
+
+
+def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatArray:
+    """K/h_rms^3 of mean separations u [length] and A/A0; 0 where blocked."""
+    (u, contact), shape = rows(
+        np.asarray(mean_separation) / np.asarray(surface.h_rms), area
+    )
+    if isinstance(surface, MeasuredSurface):
+        return flow_of_spectrum(spectrum_of(surface), u, contact).reshape(shape)
+    table = shipped_flow()
+    given = np.stack([np.ravel(surface.hurst), np.log(np.ravel(surface.zeta_1))])
+    number = np.arange(given.shape[1]).reshape(surface.shape)
+    owner = np.ascontiguousarray(np.broadcast_to(number, shape)).ravel()
+    out = table.flow(given, owner, u, contact)
+    for row in np.flatnonzero(~table.covers(*given)):
+        mine = owner == row
+        law = self_affine_law(float(given[0, row]), float(np.exp(given[1, row])), None)
+        out[mine] = flow_of_spectrum(law.spectrum, u[mine], contact[mine])
+    return out.reshape(shape)
+
+
+@quantity(
+    Dimension(length=3),
+    "flow coefficient K: flow per length of seal is K dp/(12 viscosity width)",
+    uncertainty="leakage_scatter",
+    is_column=False,
+    is_listed=on_request,
+)
+def flow_coefficient(contact: State) -> Any:
+    """Flow coefficient K of the gaps [length^3], `leakage.K`."""
+    return contact.leakage.K
+
+
+@quantity(
+    Dimension(length=1),
+    "hydraulic aperture K^(1/3)",
+    is_column=False,
+    is_listed=on_request,
+)
+def hydraulic_aperture(contact: State) -> Any:
+    """K^(1/3) [length], the gap of parallel plates with the same flow."""
+    return contact.leakage.hydraulic_aperture
+
+
+@quantity(
+    DIMENSIONLESS,
+    "model uncertainty: standard deviation of ln K",
+    is_column=False,
+    is_listed=on_request,
+)
+def leakage_scatter(contact: State) -> Any:
+    """Model uncertainty, one standard deviation of ln of the flow coefficient."""
+    return contact.leakage.scatter

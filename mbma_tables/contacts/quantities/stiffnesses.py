@@ -1,0 +1,75 @@
+"""Stiffnesses of a contact, normal and tangential, and its energy."""
+
+from typing import Any
+
+from mbma_tables.common.units import Dimension
+from mbma_tables.contacts.quantities.registry import Need, of_yielding_contacts, quantity
+from mbma_tables.contacts.quantities.state import State
+from mbma_tables.contacts.quantities.tangential import tangential_ratio_of
+
+STIFFNESS = Dimension(stress=1, length=-1)
+ENERGY = Dimension(stress=1, length=1)
+
+# of contacts and of their laws
+ENERGY_OF_YIELDED = (
+    "the energy that a yielded contact gives back is not known, since its residual "
+    "shape is not; unloading_stiffness is the initial stiffness of unloading"
+)
+NO_HARDNESS = Need(
+    "an elastic contact", lambda contact: not contact.yields, ENERGY_OF_YIELDED
+)
+
+POISSONS_RATIO = Need(
+    "nu",
+    lambda contact: contact.bodies.bodies.nu is not None,
+    "Poisson's ratio of the bodies, Bodies(..., nu=0.3), or named metals",
+)
+
+
+@quantity(
+    STIFFNESS,
+    "-dF/du per nominal area, of first loading",
+    uncertainty="stiffness_scatter",
+)
+def stiffness(contact: State) -> Any:
+    """-d(F/A0)/du [stress/length] of first loading, against the mean separation."""
+    return (contact.E_star * contact.answer.stiffness)[()]
+
+
+@quantity(
+    STIFFNESS,
+    "-dF/du per nominal area, of a small unloading",
+    uncertainty="unloading_stiffness_scatter",
+    is_listed=of_yielding_contacts,
+)
+def unloading_stiffness(contact: State) -> Any:
+    """-d(F/A0)/du [stress/length] of a small unloading at constant contact area; `stiffness` if nothing yields."""
+    if not contact.yields:
+        return contact.stiffness
+    return (contact.E_star * contact.of_loading("unloading_stiffness"))[()]
+
+
+@quantity(
+    STIFFNESS,
+    "shear stress over displacement before slip",
+    needs=(POISSONS_RATIO,),
+    uncertainty="unloading_stiffness_scatter",
+    made_of=("unloading_stiffness",),
+)
+def tangential_stiffness(contact: State) -> Any:
+    """Tangential stiffness of full stick [stress/length], `unloading_stiffness`/kappa (Mindlin 1949)."""
+    return contact.unloading_stiffness / tangential_ratio_of(contact)
+
+
+@quantity(
+    ENERGY,
+    "elastic energy per nominal area",
+    uncertainty="scatter",
+    needs=(NO_HARDNESS,),
+    is_column=False,
+)
+def energy(contact: State) -> Any:
+    """Elastic energy per nominal area [stress length], the integral of F/A0 over u; of elastic contacts alone."""
+    return contact.evaluate(
+        lambda theory, surface, u, E_star: (E_star * theory.energy(surface, u),)
+    )[0]

@@ -1,0 +1,1 @@
+"""What a designer asks: joints, scenes, sensitivities."""

@@ -1,0 +1,812 @@
+"""`Joint`: two rough metal parts and all their interface laws."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import os
+import pathlib
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.bodies.bodies import Bodies, BodiesInUnits, is_array, names_metals
+from mbma_tables.bodies.materials import Pair, effective_modulus, tangential_ratio
+from mbma_tables.common.arguments import (
+    any_labelled,
+    broadcast_shape,
+    finite_array,
+    hinted,
+    is_labelled,
+    one_number,
+    positive_array,
+    require_name,
+    spread,
+)
+from mbma_tables.common.display import Displayed, Variable, dataset_of, saved, shown
+from mbma_tables.common.errors import InputError, OutOfRangeError
+from mbma_tables.common.plots import draw_panels
+from mbma_tables.common.toml_files import read_toml
+from mbma_tables.common.units import (
+    HEAT_CONDUCTANCE,
+    Units,
+    factor,
+    force_over_area,
+    stated_unit,
+)
+from mbma_tables.contacts.contact import contact_of
+from mbma_tables.contacts.law.law import ContactLaw
+from mbma_tables.contacts.law.make import law_of
+from mbma_tables.contacts.quantities import registry
+from mbma_tables.contacts.quantities.interface import Gas, Interface
+from mbma_tables.contacts.quantities.properties import JointQuantities
+from mbma_tables.contacts.quantities.tangential import (
+    checked_direction,
+    checked_friction,
+    ratio_on,
+)
+from mbma_tables.contacts.result import Contact
+from mbma_tables.design.sensitivity import (
+    OfOneMap,
+    Sensitivity,
+    Unknowns,
+    relative_derivatives,
+    unknowns_of,
+)
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.roughness import TOPS
+from mbma_tables.surfaces.surface import Surface, assumptions
+from mbma_tables.theories import OF_MAPS, THEORIES, resolve, theory_text
+from mbma_tables.theories.base import Theory
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from mbma_tables.export.of_joint import ExportedJoint
+
+Part = AnySurface | Mapping[str, Any]
+FACES = ("part_a", "part_b")
+EXAMPLE = '{"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}'
+# the unit of a plain modulus
+PLAIN_STRESS = "GPa"
+# pressures over the hardness, and their number, in pictures
+RANGE = (1e-5, 0.3)
+POINTS = 41
+
+
+def equivalent(faces: Sequence[Any], nominal_area: Any) -> AnySurface:
+    """The rough surface whose contact with a smooth one is that of one or two faces.
+
+    With a nominal area its highest point is that of Gaussian heights of this area.
+    """
+    surface: AnySurface
+    if len(faces) == 2:
+        surface = faces[0].combined(faces[1], nominal_area)
+    elif nominal_area is None:
+        surface = faces[0]
+    else:
+        surface = dataclasses.replace(faces[0], h_max=None, nominal_area=nominal_area)
+    return surface
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Joint(JointQuantities, Displayed):
+    """Two rough metal parts pressed together: stiffness, real area, gap and conductance from one description.
+
+    Numbers of the parts, `nominal_area`, constants in `Bodies` and those of the gas may be
+    arrays, which broadcast to a batch of joints: quantities of `at_pressure` then have the
+    broadcast shape, with that of the pressures. Tables, plots, laws, sensitivities and
+    exports are of one joint.
+
+    Parameters
+    ----------
+    part_a, part_b : Surface or mapping
+        Roughness of each part: a surface (from a map, a profile, a spectrum or five
+        numbers); the arguments of `Surface.from_roughness` without a highest point; or
+        those of `Surface.from_map`, with the file under "map". Without `part_b` the other
+        face is smooth.
+    bodies : str, Metal, pair of them, float, or Bodies
+        Metals of the parts, from `mbma_tables.bodies.materials.METALS`, or the arguments of
+        `materials.Metal` by name; one if both are the same. Or `Bodies`, with the hardness
+        of the softer metal, as for `contact`: by default it is that of the metals, whose
+        temper must then be named. Or the effective modulus, "58 GPa"; a plain number is in
+        GPa. Plain pressures, here and in every method but `export`, are in the unit of the
+        modulus, GPa for metals.
+    nominal_area : array_like or str, optional
+        A0 [length^2], from which the highest point of Gaussian heights follows (`Surface`);
+        needed for parts that are mappings. Without it, surfaces keep their own highest
+        point.
+    friction : float, optional
+        Coefficient of friction, for friction cards of solvers.
+    direction : {"along", "across"}, optional
+        Of the shear relative to the lay, for parts that have one.
+    gas : {"air", "helium", "nitrogen", "argon", "vacuum"} or Gas
+        In the gaps, at 300 K and 1 atm, or ``Gas("helium", temperature=400)``.
+    theory : str or Theory, optional
+        As for `contact`.
+
+    Attributes
+    ----------
+    surface : AnySurface
+        The equivalent surface of both parts.
+    pair : Pair or None
+        The metals, where they are named.
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+        For any argument that a result would refuse later: the names of gas, theory and
+        metals, the hardness, the numbers of a face, of which all that are missing are named
+        at once. For batches of two parts whose wavelengths or Hurst exponents differ: the sum
+        of their spectra is no power law, and known of one joint at a time.
+
+    Examples
+    --------
+    >>> from mbma_tables import Joint
+    >>> ground = {"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+    >>> milled = ground | {"Rq": "0.7 um"}
+    >>> metals = ("steel 4140 hard", "aluminium 6061 hard")
+    >>> joint = Joint(ground, milled, bodies=metals, nominal_area="4 cm^2")
+    >>> found = joint.at_pressure("10 MPa")
+    >>> f"{found.area:.2%}, {found.solid_conductance:.3g} W/(m^2 K), {found.tangential_stiffness:.3g} GPa/um"
+    '1.17%, 3.96e+04 W/(m^2 K), 0.0271 GPa/um'
+    >>> table = joint.table(["10 MPa", "50 MPa"])
+    >>> [f"{value:.3g}" for value in table["total_conductance"].values]
+    ['5.72e+04', '2.07e+05']
+
+    Three finishes of one part, each with two hardnesses:
+
+    >>> from mbma_tables import Bodies
+    >>> finishes = ground | {"Rq": ["0.2 um", "0.4 um", "0.8 um"]}
+    >>> hardened = Bodies(metals=metals, hardness=[["0.95 GPa"], ["1.2 GPa"]])
+    >>> batch = Joint(finishes, milled, bodies=hardened, nominal_area="4 cm^2")
+    >>> batch.at_pressure("10 MPa").total_conductance.round(-2)
+    array([[61600., 57200., 47500.],
+           [59300., 54700., 44400.]])
+    """
+
+    part_a: Part
+    part_b: Part | None = None
+    _: dataclasses.KW_ONLY
+    bodies: Any  # `Bodies` once it is made
+    nominal_area: ArrayLike | str | None = None
+    friction: float | None = None
+    direction: str | None = None
+    gas: str | Gas | Mapping[str, Any] = "air"
+    theory: str | Theory | None = None
+    surface: AnySurface = dataclasses.field(init=False)
+    interface: Interface = dataclasses.field(init=False)
+    _faces: dict[str, AnySurface] = dataclasses.field(init=False)
+
+    def __post_init__(self) -> None:
+        faces = {}
+        for name in FACES:
+            part = getattr(self, name)
+            if part is not None or name == "part_a":
+                faces[name] = self._face(name, part)
+        object.__setattr__(self, "_faces", faces)
+        drawn = isinstance(self.part_a, Mapping) and "map" not in self.part_a
+        # a face made of numbers has the highest point of the nominal area already
+        area = None if drawn and len(faces) == 1 else self.nominal_area
+        surface = equivalent(list(faces.values()), area)
+        object.__setattr__(self, "surface", surface)
+        if is_array(self.bodies) and not names_metals(self.bodies):
+            raise InputError(
+                f"bodies are metals, a modulus of both, or Bodies; got {self.bodies!r}. Of two "
+                "Young's moduli: Bodies(E=..., nu=...); of a batch of joints: Bodies(E_star=[...])"
+            )
+        # from here on every route reads the modulus and the hardness with their unit
+        bodies = Bodies.of(self.bodies).with_stress_unit(PLAIN_STRESS)
+        object.__setattr__(self, "bodies", bodies)
+        interface = Interface(self.friction, self.direction, Gas.of(self.gas))
+        object.__setattr__(self, "interface", interface)
+        self._check()
+
+    @property
+    def pair(self) -> Pair | None:
+        """The metals, where they are named."""
+        metals: Pair | None = self.bodies.metals
+        return metals
+
+    @functools.cached_property
+    def _in_units(self) -> BodiesInUnits:
+        """The bodies as numbers."""
+        stress = stated_unit("E_star", self.bodies.E_star) or PLAIN_STRESS
+        in_units: BodiesInUnits = self.bodies.in_units(self.surface, stress)
+        return in_units
+
+    @functools.cached_property
+    def _arrays(self) -> dict[str, Any]:
+        """All numbers of the joint that may be arrays, by name."""
+        in_units = self._in_units
+        gas = self.interface.gas
+        assert gas is not None
+        numbers = {
+            "parts and nominal_area": self.surface.h_max,
+            "E_star": in_units.E_star,
+            "hardness": in_units.hardness,
+            "conductivity": in_units.conductivity_if_known,
+            "temperature": gas.temperature,
+            "gas_pressure": gas.pascals,
+            "accommodation": gas.accommodation,
+        }
+        return {name: value for name, value in numbers.items() if value is not None}
+
+    @property
+    def _is_labelled(self) -> bool:
+        return any_labelled(self.surface, *self._arrays.values())
+
+    @functools.cached_property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of a batch of joints; () for one."""
+        return broadcast_shape(**self._arrays)
+
+    def require_one(self, what: str) -> None:
+        """Reject a batch where something is of one joint."""
+        if self._is_labelled or self.shape != ():
+            raise InputError(
+                f"{what} is of one joint, and this is a batch"
+                f"{'' if self._is_labelled else f' of shape {self.shape}'}: make a Joint of one "
+                "entry's numbers, or take the quantities of at_pressure(...), which has all entries"
+            )
+
+    def _face(self, name: str, part: Any) -> AnySurface:
+        """The surface of a part."""
+        if isinstance(part, AnySurface):
+            return part
+        if not isinstance(part, Mapping):
+            raise InputError(
+                f"{name} is a surface, or its numbers by name, such as {EXAMPLE}; got {part!r}"
+            )
+        try:
+            if "map" in part:
+                options = {key: value for key, value in part.items() if key != "map"}
+                return Surface.from_map(part["map"], **options)
+            if "nominal_area" in part:
+                raise InputError(
+                    "nominal_area is of the joint, Joint(part_a, part_b, nominal_area=...), "
+                    "in a file above the tables of the parts"
+                )
+            made: AnySurface = Surface.from_roughness(
+                **part, nominal_area=self.nominal_area
+            )
+        except TypeError as fault:
+            raise InputError(f"{name}: {fault}") from None
+        except OutOfRangeError as fault:
+            raise OutOfRangeError(f"{name}: {fault}", fault.mask) from None
+        except InputError as fault:
+            raise InputError(f"{name}: {fault}") from None
+        return made
+
+    def _check(self) -> None:
+        """Refuse at once what single results would refuse."""
+        if not self._is_labelled:
+            broadcast_shape(**self._arrays)
+        checked_friction(self.friction)
+        checked_direction(self.direction, self.surface)
+        if self.bodies.nu is not None:
+            one_number("nu", tangential_ratio(self.bodies.nu, self.bodies.E))
+        if isinstance(self.theory, str):
+            require_name("theory", self.theory, (*THEORIES, *OF_MAPS))
+            surface: Any = self.surface
+            points = getattr(surface, "map", None), getattr(surface, "table", None)
+            if self.theory in OF_MAPS and points == (None, None):
+                raise InputError(
+                    f"theory {self.theory!r} is of one map: a joint of two faces, or of numbers, has none; "
+                    "theory='calibrated' applies"
+                )
+        elif self.theory is not None:
+            resolve(self.theory, self.surface)
+
+    @classmethod
+    def from_toml(cls, path: str | os.PathLike[str]) -> Joint:
+        """The joint that a TOML file describes: the arguments by name, the parts as tables.
+
+        Paths of maps are relative to the file.
+
+        Raises
+        ------
+        InputError
+            For a file that is not valid TOML, and for unknown or missing arguments.
+
+        Examples
+        --------
+        >>> from mbma_tables import Joint
+        >>> Joint.from_toml("examples/joint.toml").pair.softer.name  # doctest: +SKIP
+        'aluminium 6061 hard'
+        """
+        path = pathlib.Path(path)
+        content = read_toml(path, "joint")
+        for name in ("part_a", "part_b"):
+            if isinstance(content.get(name), Mapping) and "map" in content[name]:
+                content[name]["map"] = path.parent / content[name]["map"]
+        try:
+            return cls(**content)
+        except TypeError as fault:
+            raise InputError(f"{path}: {fault}") from None
+
+    def pressure_of(self, force: float | str) -> Any:
+        """F/A0 of a force on the nominal area, with its unit, as every method with a pressure takes it; a list for areas.
+
+        Parameters
+        ----------
+        force : float or str
+            "40 kN"; plain numbers in N.
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            Without a nominal area, and for forces that are not positive.
+
+        Examples
+        --------
+        >>> from mbma_tables import Joint
+        >>> face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+        >>> joint = Joint(face, bodies="steel 1020", nominal_area="4 cm^2", theory="calibrated")
+        >>> joint.pressure_of("40 kN"), f"{joint.at_pressure(joint.pressure_of('40 kN')).pressure:.2f} GPa"
+        ('100000000 Pa', '0.10 GPa')
+        """
+        if self.nominal_area is None:
+            raise InputError("a force needs nominal_area, over which it is the pressure")
+        return force_over_area(force, self.nominal_area, self.surface.unit)
+
+    def at_pressure(self, pressure: ArrayLike | str) -> Contact:
+        """The contact at pressures F/A0 ("10 MPa"; plain numbers in the unit of the modulus), as of `contact`: each in first loading."""
+        return self.at(pressure=pressure)
+
+    def at(
+        self,
+        *,
+        separation: ArrayLike | str | None = None,
+        mean_separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
+    ) -> Contact:
+        """The contact at a gap, a pressure or an area, as of `contact`: each in first loading.
+
+        They broadcast with the arrays of the joint, and every quantity has the broadcast
+        shape.
+
+        Examples
+        --------
+        >>> from mbma_tables import Joint
+        >>> face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+        >>> joint = Joint(face, bodies="steel 1020", nominal_area="4 cm^2", theory="calibrated")
+        >>> pressed = joint.at(mean_separation="2 um")
+        >>> f"{pressed.area:.2%}, {joint.at(area=pressed.area).mean_separation:.3f} um"
+        '0.29%, 2.000 um'
+        """
+        candidates = {
+            "separation": separation,
+            "mean_separation": mean_separation,
+            "pressure": pressure,
+            "area": area,
+        }
+        for name, value in candidates.items():
+            if value is not None:
+                candidates[name] = self._spread(name, value)
+        return contact_of(
+            self.surface, self._of_entries, candidates, self.theory, self.interface
+        )
+
+    @functools.cached_property
+    def _of_entries(self) -> BodiesInUnits:
+        """The bodies of a batch, each with a modulus, so that what depends on them alone has its shape."""
+        in_units = self._in_units
+        if self._is_labelled or self.shape == ():
+            return in_units
+        modulus = spread(np.asarray(in_units.E_star), self.shape)
+        return in_units.at(modulus, in_units.hardness)
+
+    def _spread(self, name: str, value: Any) -> Any:
+        """A gap, pressure or area in the units of the joint, for a batch in its shape.
+
+        All quantities have this shape then, also where the gas alone differs.
+        """
+        given = self._in_units.units.number(name, value)
+        if self._is_labelled or is_labelled(given) or self.shape == ():
+            return given
+        numbers = finite_array(name, given)
+        return spread(numbers, broadcast_shape(**{name: numbers}, **self._arrays))
+
+    def law(self) -> ContactLaw:
+        """The joint's contact law, for many gaps or pressures, as of `contact_law`."""
+        self.require_one("a law")
+        return law_of(self.surface, self.bodies, self.theory, None, self.interface)
+
+    def sensitivity(
+        self, pressure: float | str, quantities: Sequence[str] | None = None
+    ) -> Sensitivity:
+        """d ln(result)/d ln(number) at a pressure, for the numbers that the joint was described by.
+
+        Parameters
+        ----------
+        pressure : float or str
+            F/A0, held fixed; plain numbers in the unit of the modulus.
+        quantities : sequence of str, optional
+            As for `sensitivity`; by default with the conductances of the joint.
+
+        Returns
+        -------
+        Sensitivity
+            With a row for each number of each face, "part_a.Rq", "part_a.longest"; Young's
+            moduli of both bodies, "part_a.E" and "part_b.E"; the nominal area, the hardness
+            of the softer metal, and the pressure. Of a face given by a spectrum or a map as
+            for `sensitivity`: "part_a.heights", "part_a.lengths", its cut-offs.
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            As `sensitivity`.
+
+        Examples
+        --------
+        >>> from mbma_tables import Joint
+        >>> face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+        >>> metal = "copper C11000 hard"
+        >>> joint = Joint(face, bodies=metal, nominal_area="4 cm^2", theory="calibrated")
+        >>> slopes = joint.sensitivity("10 MPa").slopes
+        >>> f"conductance goes like Rq^{slopes['part_a.Rq']['solid_conductance']:.2f}"
+        'conductance goes like Rq^-0.67'
+        """
+        self.require_one("a sensitivity")
+        in_units = self._in_units
+        chosen = resolve(self.theory, self.surface)
+        moduli, modulus_of = self._moduli(in_units)
+        return relative_derivatives(
+            self._unknowns(chosen),
+            chosen,
+            in_units,
+            moduli=moduli,
+            modulus_of=modulus_of,
+            by="pressure",
+            value=in_units.units.number("pressure", pressure),
+            quantities=quantities,
+            interface=self.interface,
+        )
+
+    def _moduli(
+        self, in_units: BodiesInUnits
+    ) -> tuple[dict[str, Any], Callable[..., Any]]:
+        """Young's moduli of named metals, or the effective modulus, and E* as their function."""
+        if self.pair is None:
+            return {"E_star": in_units.E_star}, lambda E_star: E_star
+        metal_a, metal_b = self.pair.metals
+
+        def modulus_of(E_a: Any, E_b: Any) -> Any:
+            return effective_modulus(E_a, metal_a.nu, E_b, metal_b.nu)
+
+        return {"part_a.E": metal_a.E, "part_b.E": metal_b.E}, modulus_of
+
+    def _unknowns(self, theory: Theory) -> Unknowns:
+        """The numbers of the faces, each with the name of its part before it, and the nominal area."""
+        unit = self.surface.unit
+        overridden = () if self.nominal_area is None else TOPS
+        alone = len(self._faces) == 1
+        if alone:
+            own = unknowns_of(self.surface, theory, unit)
+            if (
+                not overridden
+                or isinstance(own, OfOneMap)
+                or "nominal_area" in own.numbers
+            ):
+                labels = {name: f"part_a.{name}" for name in own.numbers}
+                if overridden:
+                    labels["nominal_area"] = "nominal_area"
+                return dataclasses.replace(own, labels=labels)
+        faces = {
+            name: unknowns_of(face, theory if alone else None, unit)
+            for name, face in self._faces.items()
+        }
+        numbers: dict[str, float] = {}
+        one_sided: dict[str, float] = {}
+        fixed: dict[str, dict[str, float]] = {}
+        for part, face in faces.items():
+            # the nominal area determines the highest point of Gaussian heights
+            fixed[part] = {
+                name: number
+                for name, number in face.numbers.items()
+                if name in overridden
+            }
+            for name, number in face.numbers.items():
+                if name not in overridden:
+                    numbers[f"{part}.{name}"] = number
+            one_sided |= {f"{part}.{name}": sign for name, sign in face.one_sided.items()}
+        if overridden:
+            numbers["nominal_area"] = Units(unit).number(
+                "nominal_area", self.nominal_area
+            )
+
+        def make(**given: Any) -> AnySurface:
+            surfaces = []
+            for part, face in faces.items():
+                own = {
+                    name: given[f"{part}.{name}"]
+                    for name in face.numbers
+                    if name not in fixed[part]
+                }
+                surfaces.append(face.make(**own, **fixed[part]))
+            return equivalent(surfaces, given.get("nominal_area"))
+
+        if alone and faces["part_a"].batches:
+            return Unknowns(numbers, make, batches=True, one_sided=one_sided)
+        # moduli, pressure and hardness are varied with the same surface
+        return Unknowns(numbers, functools.cache(make), one_sided=one_sided)
+
+    def export(
+        self,
+        target: str,
+        pressures: tuple[float | str, float | str] | None = None,
+        name: str | None = None,
+        heat: bool | None = None,
+        friction_pressure: float | str | None = None,
+        *,
+        path: str | os.PathLike[str] | None = None,
+        quantity: str | Sequence[str] | None = None,
+        rows: int | None = None,
+        rtol: float | None = None,
+        length_unit: str | None = None,
+        stress_unit: str | None = None,
+        leakage: bool = False,
+        peklenik: float | None = None,
+        binaries: str | None = None,
+        made_by: tuple[str, ...] = (),
+    ) -> str | bytes | list[pathlib.Path]:
+        """The joint as input of a solver, as data or as code, for every target of laws of `mbma export`.
+
+        Conductance in rows, cards and subroutines of solvers is the total one, of the solid
+        spots and of the gas in the gaps together. Laws as code have `total_conductance`, and
+        beside it `solid_conductance` and `gas_conductance`.
+
+        Parameters
+        ----------
+        target : str
+            A target of `mbma export` that accepts a law: rows such as "calculix", "abaqus",
+            "csv", functions such as "c-law", "modelica-law" and "fmu".
+        pressures : pair of float or str
+            Smallest and largest pressure of rows; plain numbers in the unit of stress of the file.
+        name : str, optional
+            Name of the surface interaction or of the functions, or what names begin with;
+            formats without names have it in their comments.
+        heat : bool, optional
+            Whether the conductance is also written. By default it is; code leaves it out,
+            as its comments say, where the joint has no thermal conductivity.
+        friction_pressure : float or str, optional
+            Pressure at which a friction card's tangential stiffness is computed; default:
+            the geometric mean.
+        path : path-like, optional
+            File to write, and beside it those that belong to it, by the end that the target
+            gives them.
+        quantity : str or sequence of str, optional
+            Of the rows, as for `describe_law`: data, and programs that interpolate any
+            table, take every quantity of a contact. Several for targets "lsdyna", "getdp"
+            and "moose-function". Default: "total_conductance", in a vacuum
+            "solid_conductance", with the pressure in solvers that have both; without `heat`
+            pressure.
+        rows, rtol : int and float, optional
+            Number of rows, or their largest error of linear interpolation; by default as
+            few rows as 1e-3 needs, or as many as the program keeps.
+        length_unit, stress_unit : str, optional
+            Of the file: mm and MPa, with conductance in mW/(mm^2 K), or those that the
+            program prescribes.
+        leakage : bool
+            Functions have the flow coefficient of the gaps, too; rows have it alone.
+        peklenik : float, optional
+            Of a film, as for `flow_factors`.
+        binaries : {"here", "all", "none"}, optional
+            Of an FMU.
+        made_by : sequence of str
+            Lines of the header on how the file was made.
+
+        Returns
+        -------
+        str, bytes or list of pathlib.Path
+            Without a path the first file of the target, bytes of a binary format; with a
+            path the paths of all files. Solver input has a friction card if the joint has a
+            coefficient of friction; functions contain the tangential stiffness, which
+            needs Poisson's ratio of the bodies: comments say so where it is missing.
+
+        Raises
+        ------
+        InputError
+            For an option that the target does not take or that has a wrong type, for
+            target "c", which is the whole model, and for a target that is several files
+            without a path.
+
+        Examples
+        --------
+        >>> from mbma_tables import Joint
+        >>> face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+        >>> copper = "copper C11000 hard"
+        >>> joint = Joint(face, bodies=copper, nominal_area="4 cm^2", theory="calibrated")
+        >>> card = joint.export("calculix", ("0.1 MPa", "50 MPa"), name="JOINT")
+        >>> [line for line in card.splitlines() if line.startswith("*") and line[1] != "*"][:2]
+        ['*SURFACE INTERACTION, NAME=JOINT', '*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL']
+        """
+        from mbma_tables.export.of_joint import joint_files
+        from mbma_tables.export.targets import write_files
+
+        try:
+            out = None if path is None else pathlib.Path(path)
+        except TypeError:
+            raise InputError(f"path must be that of a file, got {path!r}") from None
+        files = joint_files(
+            self._exported(),
+            target,
+            out=out,
+            pressures=pressures,
+            name=name,
+            heat=heat,
+            friction_pressure=friction_pressure,
+            quantity=quantity,
+            length_unit=length_unit,
+            stress_unit=stress_unit,
+            made_by=made_by,
+            rows=rows,
+            rtol=rtol,
+            leakage=leakage,
+            peklenik=peklenik,
+            binaries=binaries,
+        )
+        if out is not None:
+            return write_files(out, files)
+        try:
+            return files[""].decode()
+        except UnicodeDecodeError:
+            return files[""]
+
+    def _exported(self) -> ExportedJoint:
+        """What an export needs of the joint."""
+        from mbma_tables.export.of_joint import ExportedJoint
+
+        self.require_one("an export")
+        in_units = self._in_units
+        gas = self.interface.gas
+        assert gas is not None
+        conductivity = None
+        if in_units.conductivity_is_given:
+            per_length, unit = in_units.conductivity
+            if unit == HEAT_CONDUCTANCE.unit(in_units.units):
+                # k_s over the surface's unit of length, to W/(m K)
+                conductivity = float(per_length) / factor("m", str(self.surface.unit))
+        isotropic = self.direction is None
+        return ExportedJoint(
+            surface=self.surface,
+            E_star=self.bodies.E_star,
+            theory=self.theory,
+            hardness=np.inf if self.bodies.hardness is None else self.bodies.hardness,
+            conductivity=conductivity,
+            kappa=self._kappa,
+            kappa_varies=not isotropic,
+            friction=self.friction,
+            gas=gas,
+            bodies=self.bodies,
+            interface=self.interface,
+        )
+
+    def _kappa(self, area: Any) -> Any:
+        """Normal over tangential stiffness at a contact area, which only matters to surfaces with a lay."""
+        return ratio_on(self.surface, self.bodies, self.direction, area)
+
+    def table(self, pressures: ArrayLike | Sequence[str]) -> xr.Dataset:
+        """Every quantity of the joint at pressures, as an xarray Dataset with units and model uncertainties."""
+        self.require_one("a table")
+        pressed = self.at_pressure(np.atleast_1d(np.asarray(pressures)).tolist())
+        variables = {}
+        for name, variable in self.quantities(pressed).items():
+            dims = ("pressure",) if np.ndim(variable.values) else ()
+            variables[name] = variable._replace(dims=dims)
+        return dataset_of(variables, self.facts_of(pressed))
+
+    def quantities(self, pressed: Contact) -> dict[str, Variable]:
+        """Values, units, meanings and model uncertainties of a contact of this joint, by name."""
+        return pressed.variables()
+
+    def plot(
+        self,
+        path: str | os.PathLike[str] | None = None,
+        pressures: tuple[float | str, float | str] | None = None,
+    ) -> Figure:
+        """Plot the quantities against pressure, as `Contact.plot`.
+
+        Parameters
+        ----------
+        path : str or path, optional
+            File to save the figure to: "name.svg", .pdf, .png.
+        pressures : pair of float or str, optional
+            Smallest and largest pressure, plain numbers in the unit of the modulus;
+            default: 1e-5 and 0.3 of the softer metal's hardness.
+
+        Raises
+        ------
+        InputError
+            For pressures that do not rise, and an unknown kind of file.
+        """
+        self.require_one("a plot")
+        if pressures is None:
+            return super().plot(path)
+        if not isinstance(pressures, tuple | list) or len(pressures) != 2:
+            raise InputError(
+                f"pressures are the smallest and the largest, got {pressures!r}"
+            )
+        units = self._in_units.units
+        low, high = (
+            float(
+                positive_array(
+                    "pressures", one_number("pressures", units.number("pressure", end))
+                )
+            )
+            for end in pressures
+        )
+        if low >= high:
+            raise InputError(
+                f"pressures are the smallest and the largest, got {pressures!r}"
+            )
+        return saved(self._drawn(self.at_pressure(np.geomspace(low, high, POINTS))), path)
+
+    def _range(self) -> Contact:
+        """The contact at pressures from 1e-5 to 0.3 of the softer metal's hardness."""
+        in_units = self._in_units
+        largest = float(np.asarray(in_units.hardness))
+        if np.isinf(largest):
+            # of metals without a temper the softest, else the mean pressure in light contact
+            largest = float(in_units.E_star * self.surface.rms_gradient) / 2
+            if self.pair is not None:
+                largest = Units(stress=in_units.units.stress).number(
+                    "pressure", f"{self.pair.softer.hardness[0]} GPa"
+                )
+        return self.at_pressure(np.geomspace(*RANGE, POINTS) * largest)
+
+    def facts(self) -> dict[str, str]:
+        """The arguments of the joint, by name, and what its faces assume beyond them."""
+        facts = {}
+        hardness = self.bodies.hardness
+        if self.pair is not None:
+            metal_a, metal_b = self.pair.metals
+            facts["metals"] = f"{metal_a.name} on {metal_b.name}"
+            if self.bodies.conductivity == self.pair.conductivities:
+                facts["conductivities"] = self.pair.ranges_of_conductivity
+            if hardness is None:
+                hardness = f"not known: name the temper of {self.pair.softer.name}"
+        in_units = self._in_units
+        facts["E_star"] = shown(in_units.E_star, str(in_units.units.stress))
+        if is_array(hardness):
+            hardness = shown(in_units.hardness, str(in_units.units.stress))
+        facts["hardness"] = "infinite" if hardness is None else str(hardness)
+        facts["theory"] = theory_text(self.surface, self.theory)
+        facts["gas"] = Gas.of(self.gas).name
+        facts["surface"] = repr(self.surface)
+        assumed = assumptions(self.surface)
+        if assumed:
+            facts["assumed"] = "; ".join(assumed)
+        return facts
+
+    def facts_of(self, pressed: Contact) -> dict[str, str]:
+        """The facts of the joint with what is known of a contact of it: the theory by which it was computed, and the loading."""
+        facts = self.facts() | {"theory": pressed.theory}
+        if pressed.loading:
+            facts["loading"] = pressed.loading
+        return facts
+
+    _facts = facts
+
+    def _variables(self) -> dict[str, Variable]:
+        self.require_one("a dataset")
+        return self.quantities(self._range())
+
+    def _figure(self) -> Figure:
+        self.require_one("a plot")
+        return self._drawn(self._range())
+
+    def _drawn(self, pressed: Contact) -> Figure:
+        unit = pressed.units["pressure"]
+        names = [name for name in registry.results() if name != "pressure"]
+        return draw_panels(
+            np.ravel(pressed.pressure), pressed.panels(names), f"pressure F/A0 [{unit}]"
+        )
+
+
+Joint.__init__ = hinted(Joint.__init__)  # type: ignore[method-assign]

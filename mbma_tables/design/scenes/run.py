@@ -1,0 +1,509 @@
+"""Execute a plan: an xarray Dataset of quantities with their units and provenance.
+
+Each step imports, reads and evaluates only what it needs.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.bodies.bodies import Bodies
+from mbma_tables.bodies.materials import ELASTIC_PSI
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import ConvergenceError
+from mbma_tables.common.plots import Curve, theory_label
+from mbma_tables.common.progress import doing
+from mbma_tables.contacts.quantities.registry import registry, unit_of
+from mbma_tables.design.scenes.plan import AMPLIFICATION, TABLES, Plan, Step
+from mbma_tables.design.scenes.problem import INVERTED, Problem
+from mbma_tables.islands.island_models import RigidModel, answer_islands
+from mbma_tables.islands.variants import get_variant
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.self_affine import PARAMETERS
+from mbma_tables.surfaces.surface import Surface
+from mbma_tables.theories import resolve
+from mbma_tables.theories.mbma.models import get_model
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from mbma_tables.contacts.result import Contact
+    from mbma_tables.theories.mbma.profile import Shape
+
+VALIDITY = (
+    "valid",
+    "scatter",
+    "area_scatter",
+    "stiffness_scatter",
+    "unloading_stiffness_scatter",
+    "separation_scatter",
+)
+YIELDED = ("yielded", "mean_pressure", "plane_separation", "unloading_stiffness")
+
+
+@dataclasses.dataclass
+class Run:
+    """A plan in execution: values passed between steps, and results."""
+
+    problem: Problem
+    surface: AnySurface
+    gap: Any = None  # separations d
+    # dimensions and values by name
+    quantities: dict[str, tuple[tuple[str, ...], ArrayLike]] = dataclasses.field(
+        default_factory=dict,
+    )
+    errors: dict[str, float] = dataclasses.field(
+        default_factory=dict
+    )  # bounds that steps reached
+    reasons: dict[str, list[int]] | None = None
+
+    def keep(self, values: Mapping[str, ArrayLike], *dims: str) -> None:
+        """Record values over dimensions, gaps by default."""
+        dimensions = dims or ("gap",)
+        for name, array in values.items():
+            self.quantities[name] = (dimensions, array)
+
+
+def _contact(run: Run, step: Step) -> None:
+    """One contact at all gaps, and of it the requested quantities."""
+    from mbma_tables.contacts.contact import contact
+
+    problem = run.problem
+    theory = problem.theory
+    if problem.sums_islands:
+        options = {
+            "island_model": step.island_model,
+            "variant": problem.variant,
+            "rtol": step.rtol,
+            "outside": _outside(step),
+        }
+        theory = resolve(theory, options=options)
+    assert problem.prescribed is not None
+    # without its end the surface is a higher one, whose mean gaps are others than the scene's
+    if "finite_height" in problem.dropped:
+        arguments = {"separation": run.gap}
+    else:
+        arguments = {problem.prescribed[:-1]: problem.gaps}
+    bodies = Bodies(
+        problem.E_star, hardness=problem.hardness, conductivity=problem.conductivities
+    )
+    pressed = contact(run.surface, bodies, theory=theory, **arguments)
+    if run.gap is None:
+        run.gap = pressed.separation
+    _keep_quantities(run, pressed)
+    error = float(pressed.error.max())
+    if problem.sums_islands and problem.hardness is None:
+        error *= _amplification(run, theory)
+    run.errors[step.name] = error
+
+
+def _keep_quantities(run: Run, pressed: Contact) -> None:
+    """Record the requested quantities of a contact."""
+    problem = run.problem
+    requested = problem.outputs
+    names = [name for name in registry() if name in requested]
+    # the Hertz area has a step of its own
+    if "area" in names and "subscale_area" in problem.dropped:
+        names.remove("area")
+    if "validity" in requested:
+        names += VALIDITY
+    if "yield" in requested:
+        names += YIELDED
+    # some are one number for all gaps
+    shape = np.shape(pressed.mean_separation)
+    run.keep({name: np.broadcast_to(pressed.quantity(name), shape) for name in names})
+    if "leakage" in requested:
+        leakage = pressed.leakage
+        run.keep(
+            {
+                "leakage": leakage.K,
+                "leakage_valid": leakage.valid,
+                "leakage_scatter": leakage.scatter,
+                "leakage_blocked": leakage.blocked,
+            }
+        )
+    if "validity" in requested:
+        # places of the entries that each reason concerns
+        run.reasons = {}
+        for reason, is_concerned in pressed.reasons.items():
+            run.reasons[reason] = np.flatnonzero(is_concerned).tolist()
+
+
+def _outside(step: Step) -> str:
+    """What `outside` is for islands of a step: those that a table does not cover are solved."""
+    return "exact" if step.island_model_name in TABLES else "raise"
+
+
+def _amplification(run: Run, theory: Any) -> float:
+    """Largest ratio of the errors of the requested quantities to that of force and area."""
+    problem = run.problem
+    h_max = float(run.surface.h_max)
+    gap = run.gap[run.gap < h_max]
+    is_inverted = problem.prescribed in INVERTED
+    needs_slopes = problem.needs_slopes
+    if not gap.size or not (needs_slopes or is_inverted):
+        return 1.0
+    totals = theory.totals(run.surface, gap, slopes=True)
+    # -d ln p/dd
+    log_slope = -totals.pressure_slope / totals.pressure
+    factor = 1.0
+    if is_inverted:
+        # pressures at prescribed areas: less accurate where the area hardly rises
+        by_area = log_slope * totals.area / np.abs(totals.area_slope)
+        factor += max(1.0, float(by_area.max())) if problem.prescribed == "areas" else 1.0
+    if not needs_slopes:
+        return factor
+    # the stiffness is small only next to a turning point
+    flatness = 1 / ((h_max - gap) * np.abs(log_slope))
+    return factor * (AMPLIFICATION["slopes"] * max(1.0, float(flatness.max())))
+
+
+def _law(run: Run, step: Step) -> None:
+    """Pressure and area of a theory other than MBMA by its law."""
+    from mbma_tables.contacts.law.make import contact_law
+
+    problem = run.problem
+    assert step.rtol is not None
+    assert problem.prescribed is not None
+    law = contact_law(run.surface, problem.E_star, theory=problem.theory, rtol=step.rtol)
+    amplification = 1.0
+    if problem.prescribed in INVERTED:
+        run.gap = law.separation(**{problem.prescribed[:-1]: problem.gaps})
+        amplification = AMPLIFICATION["inverse"]
+    for name in problem.outputs & {"pressure", "area"}:
+        at_gap = getattr(law, name)
+        run.keep({name: at_gap(separation=run.gap)})
+    run.errors[step.name] = amplification * law.error
+
+
+def _shape(surface: AnySurface) -> Shape:
+    """The surface as profiles take it."""
+    if not isinstance(surface, Surface):
+        return cast("Shape", surface)
+    return (
+        float(surface.hurst),
+        float(surface.zeta_1),
+        float(surface.h_max / surface.h_rms),
+    )
+
+
+def hertz_area(run: Run, step: Step) -> None:
+    """A/A0 with eta = 1 in Eq. 38 (C.1)."""
+    from mbma_tables.theories.mbma.profile import profile
+
+    assert step.island_model is not None
+    assert step.rtol is not None
+    surface = run.surface
+    variant = get_variant(run.problem.variant)
+    island_model = get_model(step.island_model, step.rtol, variant)
+    depth = (float(surface.h_max) - run.gap) / float(surface.h_rms)
+    along_depth = profile(
+        _shape(surface),
+        island_model,
+        variant,
+        step.rtol,
+        _outside(step),
+        rows=4,
+    )
+    is_touching = depth > 0
+    area = np.zeros(depth.shape)
+    area[is_touching] = along_depth.totals(depth[is_touching])[3]
+    run.keep({"area": area})
+    run.errors[step.name] = along_depth.error
+
+
+def island_statistics(run: Run, step: Step) -> None:
+    """Number of islands at every gap; load, area, density along their approach (Eqs. 40, 42)."""
+    from mbma_tables.theories.mbma.island import islands_of, scale_area, scale_force
+    from mbma_tables.theories.mbma.profile import profile, source_of
+
+    assert step.island_model is not None
+    assert step.rtol is not None
+    problem = run.problem
+    surface = run.surface
+    shape = _shape(surface)
+    variant = get_variant(problem.variant)
+    h_rms = float(surface.h_rms)
+    depth = np.asarray(surface.h_max - run.gap) / h_rms
+    source = source_of(shape, variant)
+    deepest = max(float(depth.max()), 0.0)
+    # approaches up to the deepest, graded towards first contact
+    fraction = np.linspace(0, 1, problem.points + 1)[1:]
+    stretched = fraction * np.arcsinh(np.sqrt(deepest / source.layer))
+    delta = source.layer * np.sinh(stretched) ** 2
+    # where no gap touches there is no distribution
+    number = np.zeros(depth.size)
+    density = np.zeros((depth.size, delta.size))
+    pressure = np.zeros(delta.size)
+    area = np.zeros(delta.size)
+    error = 0.0
+    if deepest > 0:
+        # islands are counted without an island model
+        counted = profile(shape, RigidModel(), variant, step.rtol, rows=3)
+        number[depth > 0] = counted.totals(depth[depth > 0])[2]
+        groups, s, q0 = islands_of(surface, delta * h_rms, variant)
+        island_model = get_model(step.island_model, step.rtol, variant)
+        phi = answer_islands(island_model, groups, _outside(step))
+        pressure = problem.E_star * s / q0 * scale_force(groups) * phi.phi_F
+        # without the area of smaller scales, all of the summit's area is in contact: eta = 1
+        eta = groups["eta"] if "subscale_area" in problem.dropped else 1.0
+        area = scale_area(groups) * phi.phi_A / eta / q0**2
+        shift, rate = source.heights(groups, delta)
+        spread = source.density(groups, delta, shift - rate * depth[:, None])
+        number = number * q0**2
+        # no island approaches further than the highest one
+        density = np.where(delta <= depth[:, None], spread, 0.0) * q0**2 / s
+        error = max(counted.error, float(np.max(phi.error)))
+    run.keep({"island_number": number})
+    run.keep(
+        {"island_delta": delta * h_rms, "island_force": pressure, "island_area": area},
+        "approach",
+    )
+    run.keep({"island_density": density}, "gap", "approach")
+    run.errors[step.name] = error
+
+
+def profiles(run: Run, step: Step) -> None:
+    """p(r) and d(r) of the islands at these approaches, solved exactly (Eqs. 34, 36, 37)."""
+    from mbma_tables.islands import greenwood_tripp
+    from mbma_tables.theories.mbma.island import islands_of
+
+    assert step.rtol is not None
+    problem = run.problem
+    delta = np.atleast_1d(np.asarray(problem.deltas, dtype=float)).ravel()
+    groups, s, q0 = islands_of(run.surface, delta, get_variant(problem.variant))
+    sigma = groups["sigma"]
+    solved = greenwood_tripp.solve(groups["X"], groups["mu"], rtol=step.rtol)
+    radius = np.sqrt(2 * groups["R_d"] * sigma)
+    run.keep({"profile_delta": delta}, "island")
+    pressure = problem.E_star * q0 * s * (sigma / radius)[:, None] * solved.pressure
+    run.keep(
+        {
+            "profile_radius": solved.rho * radius[:, None] / q0,
+            "profile_pressure": pressure,
+            "profile_gap": solved.gap * sigma[:, None] * s,
+        },
+        "island",
+        "node",
+    )
+    run.errors[step.name] = float(np.max(solved.error))
+
+
+def other_theory(
+    theory: Any,
+    surface: AnySurface,
+    gap: FloatArray,
+    E_star: float,
+    hardness: float = math.inf,
+) -> Curve:
+    """A theory, given as for `contact`, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
+    from mbma_tables.theories.users import answer_where_finite
+
+    chosen = resolve(theory, surface)
+    u = (float(surface.h_max) + gap) / 2
+    if hardness < math.inf:
+        chosen = chosen.with_hardness(hardness, E_star)
+    answer = answer_where_finite(chosen, surface, u)
+    of_pressure, of_area = answer._fields[:2]
+    return Curve(
+        theory_label(chosen.name),
+        u / surface.h_rms,
+        E_star * answer.pressure,
+        answer.area,
+        chosen.scatter(surface, of_pressure, answer.area),
+        chosen.scatter(surface, of_area, answer.area),
+    )
+
+
+def comparison(run: Run, step: Step) -> None:
+    """Another theory beside the scene's own."""
+    problem = run.problem
+    cap = math.inf if problem.hardness is None else problem.hardness
+    other = other_theory(step.name, problem.surface, run.gap, problem.E_star, cap)
+    run.keep({f"{step.name}_pressure": other.pressure, f"{step.name}_area": other.area})
+
+
+def run_plan(problem: Problem, plan: Plan) -> xr.Dataset:
+    """The quantities of a problem with units and provenance.
+
+    Raises
+    ------
+    ConvergenceError
+        If their error exceeds the tolerance.
+    """
+    run = Run(problem, problem.surface)
+    h_max = float(problem.surface.h_max)
+    if problem.prescribed == "pressures":
+        run.keep({"nominal_pressure": problem.gaps})
+    elif problem.prescribed == "areas":
+        run.keep({"prescribed_area": problem.gaps})
+    elif problem.gaps is not None:
+        is_separation = problem.prescribed == "separations"
+        run.gap = problem.gaps if is_separation else 2 * problem.gaps - h_max
+        if "finite_height" in problem.dropped:
+            run.surface = _without_end(problem.surface, run.gap, plan.rtol)
+    # steps of a plan by name; any other name is that of a theory to compare with
+    evaluated_by: dict[str, Callable[[Run, Step], None]] = {
+        "contact": _contact,
+        "law": _law,
+        "profiles": profiles,
+        "hertz area": hertz_area,
+        "island statistics": island_statistics,
+    }
+    for step in plan.steps:
+        doing(f"{step.name}: {step.count}")
+        evaluate = evaluated_by.get(step.name, comparison)
+        evaluate(run, step)
+    error = max(run.errors.values(), default=0.0)
+    if error > plan.rtol:
+        reached = f"the error bound reached is {error:.2e}, above rtol = {plan.rtol:.2e}"
+        raise ConvergenceError(f"{reached}: give a larger rtol")
+    if run.gap is not None:
+        run.keep({"separation": run.gap, "mean_separation": (h_max + run.gap) / 2})
+    return to_dataset(run, plan)
+
+
+def _without_end(surface: Any, gap: FloatArray, rtol: float) -> AnySurface:
+    """The surface with an h_max beyond which nothing contributes at the gaps."""
+    # exp(-(d + t)^2/2) <= exp(-d^2/2) exp(-t^2/2), of which less than a tenth of the tolerance is
+    # left beyond this height; ten more for the powers before it, one s, or h_rms, for h_d
+    tail = math.sqrt(2 * (10 - math.log(0.1 * rtol))) + 1
+    s = float(getattr(surface, "s", surface.h_rms))
+    height = max(float(gap.max()), 0.0) + tail * s
+    higher: AnySurface = dataclasses.replace(surface, h_max=height)
+    return higher
+
+
+# the quantity with the same unit, and the description, of what scenes have besides contacts
+OF_SCENES = {
+    "nominal_pressure": ("pressure", "F/A0 as prescribed"),
+    "prescribed_area": ("area", "A/A0 as prescribed"),
+    "leakage": (
+        "flow_coefficient",
+        "flow coefficient k h_rms^3: flow per length of seal is it dp/(12 viscosity width)",
+    ),
+    "leakage_valid": ("valid", "whether flow through such contacts was simulated"),
+    "leakage_scatter": (
+        "leakage_scatter",
+        "standard deviation of ln of the flow coefficient between simulations",
+    ),
+    "leakage_blocked": ("valid", "whether contact percolates"),
+    "island_number": ("D", "islands in contact per nominal area (Eq. 42)"),
+    "island_delta": ("delta", "approach of an island"),
+    "island_force": ("island_force", "load of an island at that approach"),
+    "island_area": ("island_area", "contact area of an island at that approach"),
+    "island_density": ("island_density", "islands per nominal area and approach"),
+    "profile_delta": ("delta", "approach of the island"),
+    "profile_radius": ("R_d", "radius r in the island"),
+    "profile_pressure": ("pressure", "pressure p(r) (Eq. 36)"),
+    "profile_gap": (
+        "separation",
+        "d(r), deformed sphere to mid-plane of the summits (Eq. 34)",
+    ),
+}
+
+
+def _units(problem: Problem) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of every quantity that a scene can hold."""
+    quantities = {}
+    for name, declared in registry().items():
+        quantities[name] = (name, declared.meaning)
+    quantities |= OF_SCENES
+    quantities["area"] = ("area", "real contact area A/A0")
+    if "subscale_area" in problem.dropped:
+        quantities["area"] = ("area", "Hertz area of the summits over A0 (eta = 1)")
+    for name in problem.theories:
+        quantities[f"{name}_pressure"] = ("pressure", f"F/A0 by {name}")
+        quantities[f"{name}_area"] = ("area", f"A/A0 by {name}")
+    units = {}
+    for name, (same_unit, meaning) in quantities.items():
+        units[name] = (unit_of(same_unit, problem.units), meaning)
+    units["solid_conductance"] = (
+        problem.conductance_unit,
+        "conductance per nominal area",
+    )
+    return units
+
+
+# the gaps, the prescribed quantity, and what islands are ordered by
+COORDINATES = (
+    "separation",
+    "mean_separation",
+    "nominal_pressure",
+    "prescribed_area",
+    "profile_delta",
+    "island_delta",
+)
+
+
+def to_dataset(run: Run, plan: Plan) -> xr.Dataset:
+    """The computed quantities; coordinates are gaps and the prescribed quantity."""
+    import xarray as xr
+
+    units = _units(run.problem)
+    variables = {}
+    for name, (dims, values) in run.quantities.items():
+        unit, meaning = units[name]
+        variables[name] = xr.Variable(dims, values, {"units": unit, "long_name": meaning})
+    dataset = xr.Dataset(variables, attrs=_attributes(run, plan))
+    return dataset.set_coords([name for name in COORDINATES if name in variables])
+
+
+def _attributes(run: Run, plan: Plan) -> dict[str, str | float]:
+    """What the quantities were calculated from and how."""
+    problem = run.problem
+    surface = problem.surface
+    by_islands = [step for step in plan.steps if step.island_model is not None]
+    island_models = {step.name: step.island_model_name for step in by_islands}
+    attributes: dict[str, str | float] = {
+        "title": problem.title,
+        "plan": plan.text(),
+        "rtol": plan.rtol,
+        "error": max(run.errors.values(), default=0.0),
+        "errors": json.dumps(run.errors),
+        "theory": problem.theory_name,
+        "variant": get_variant(problem.variant).name if problem.sums_islands else "",
+        "island_models": json.dumps(island_models),
+        "switched_off": " ".join(sorted(problem.dropped)),
+        "E_star": float(problem.E_star),
+        "table_hashes": json.dumps(_hashes(by_islands)),
+    }
+    # psi times the hardness
+    stress = float(problem.E_star * surface.rms_gradient)
+    if problem.hardness is None:
+        attributes["elastic_hardness"] = stress / ELASTIC_PSI
+    else:
+        attributes["hardness"] = float(problem.hardness)
+        attributes["psi"] = stress / float(problem.hardness)
+    if run.reasons is not None:
+        attributes["reasons"] = json.dumps(run.reasons)
+    for name in PARAMETERS:
+        number = getattr(surface, name)
+        # a spectrum that is no power law has no Hurst exponent
+        if number is not None:
+            attributes[f"surface_{name}"] = float(number)
+    return attributes
+
+
+def _hashes(steps: list[Step]) -> dict[str, str]:
+    """Hashes of the values of the tables used."""
+    used = {step.island_model_name: step.island_model for step in steps}
+    if not used.keys() & set(TABLES):
+        return {}
+    from mbma_tables.tables.open import open_table
+
+    hashes = {}
+    for name in TABLES:
+        if name in used:
+            # a table is named, or is an object that a user opened
+            island_model: Any = used[name]
+            table = open_table(name) if island_model == name else island_model
+            hashes[name] = str(table.content.attributes["values_sha256"])
+    return hashes

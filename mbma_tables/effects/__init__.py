@@ -1,0 +1,1 @@
+"""Physics that takes a contact: films of lubricant, rough spheres and cylinders."""

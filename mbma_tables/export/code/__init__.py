@@ -1,0 +1,1 @@
+"""Laws as source code, and as functional mock-up units."""

@@ -1,0 +1,120 @@
+"""Laws of the core as C in one file: its code, and the numbers of laws as data."""
+
+import functools
+import re
+import zlib
+from collections.abc import Mapping
+
+import numpy as np
+
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.contacts.law import block as at
+from mbma_tables.export.code.language import AskedLaw
+from mbma_tables.export.text import (
+    braces,
+    core_file,
+    filled,
+    number,
+    numerals,
+    template,
+    wrapped,
+)
+
+DATA = """\
+static const struct {{
+    mbma_law_head head;
+    mbma_law_row rows[{rows}];
+    mbma_law_record records[{records}];
+}} {name}_DATA = {{
+{data}
+}};
+static const mbma_law {name} = {{&{name}_DATA.head, {name}_DATA.rows, {name}_DATA.records, \
+{records} - 1}};
+"""
+# functions that other files see, where they are made
+_DEFINED = re.compile(
+    r"^(?!static|typedef|MBMA_INLINE)\w[\w *]*\b(mbma_\w+)\([^{;]*\{$", re.M
+)
+
+
+def blocks_of(asked: AskedLaw) -> dict[str, FloatArray]:
+    """Blocks of the law, of the elastic law whose slope functions follow, and of leakage."""
+    blocks = {"LAW": asked.exported.law.block}
+    if asked.yields:
+        blocks["ELASTIC"] = asked.sloped.block
+    if "leakage" in asked.more:
+        blocks["FLOW"] = asked.exported.leakage.block
+    if asked.gas is not None:
+        blocks["GAS"] = asked.gas.block
+    return blocks
+
+
+def core_places(asked: AskedLaw, places: Mapping[str, str]) -> dict[str, str]:
+    """Places of the template of C: the core's code, and the law's blocks as data."""
+    name = asked.name
+    data = [_data(f"{name}_{of}", block) for of, block in blocks_of(asked).items()]
+    leakage = asked.more.get("leakage", "")
+    declared = filled(
+        "code/languages/law.h",
+        dict.fromkeys(asked.slopes, ""),
+        HEADER="",
+        NAME=name,
+        LEAKAGE=leakage,
+        GAS="" if asked.gas is None else "yes",
+    )
+    texts = {
+        "CORE": core_text(name),
+        "CODE": _code_mark(),
+        "DECLARED": declared.lstrip(),
+        "LAWS": "".join(data).rstrip(),
+    }
+    return texts | roughness_place(asked)
+
+
+def roughness_place(asked: AskedLaw) -> dict[str, str]:
+    """The roughness, which flow through gaps of parted bodies depends on."""
+    if "leakage" not in asked.more:
+        return {}
+    return {"FLOW_H_RMS": number(asked.exported.leakage.h_rms)}
+
+
+def core_text(prefix: str) -> str:
+    """Laws of the core with their headers.
+
+    A prefix to the functions lets a program hold several laws.
+    """
+    texts = [core_file(name) for name in ("mbma.h", "elementary.h", "law.c")]
+    lines = ["/* functions of the core, which this file holds, under names of its own */"]
+    for text in texts:
+        names = _DEFINED.findall(text)
+        lines.extend(f"#define {name} {prefix}_{name}" for name in names)
+    lines.extend(re.sub(r'^#include ".*"\n', "", text, flags=re.M) for text in texts)
+    return "\n".join(lines)
+
+
+@functools.cache
+def _code_mark() -> str:
+    """A number of all code that laws in one file share, where other code is refused."""
+    code = core_text("")
+    for name in ("law.c", "interfaces.c", "uinter.c", "gapcon.c"):
+        code += template(f"code/languages/{name}")
+    return f"0x{zlib.crc32(code.encode()):08x}"
+
+
+def _data(name: str, block: FloatArray) -> str:
+    """A law's block as the head, rows and records of a variable in C, every number as it is."""
+    # indices, shifts and bases are integers in words of the same size
+    words = block.view(np.int64)
+    first_record = int(words[at.RECORDS])
+    head = braces(
+        *numerals(block[: at.EXPONENT]), *numerals(words[at.EXPONENT : at.HEAD])
+    )
+    rows = words[at.HEAD : first_record].reshape(-1, 2)
+    records = []
+    for record in block[first_record:].reshape(-1, at.RECORD):
+        force, area = np.split(record[at.FORCE_AT : -1], 2)
+        centre_and_rate = numerals(record[: at.FORCE_AT])
+        records.append(braces(*centre_and_rate, force, area, *numerals(record[-1])))
+    parts = (head, braces(*rows), braces(*records))
+    data = ",\n".join(wrapped(part) for part in parts)
+    return DATA.format(name=name, data=data, rows=len(rows), records=len(records))

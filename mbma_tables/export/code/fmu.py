@@ -1,0 +1,283 @@
+"""A contact law as a Functional Mock-up Unit, FMI 2.0, model exchange and co-simulation: C and binaries."""
+
+import contextlib
+import importlib.util
+import io
+import platform
+import re
+import shutil
+import sys
+import uuid
+import zipfile
+from typing import Any
+from xml.etree import ElementTree as ET
+
+from mbma_tables import __version__
+from mbma_tables.common.errors import InputError
+from mbma_tables.common.units import factor
+from mbma_tables.export.code.language import AskedLaw
+from mbma_tables.export.code.law_code import MAX_NAME, asked_law, text_of
+from mbma_tables.export.code.reserved_words import windows_words
+from mbma_tables.export.exported_law import ExportedLaw
+from mbma_tables.export.model.c_code import BuildError, built_by
+from mbma_tables.export.targets import CODE, Target
+from mbma_tables.export.text import checked_name, filled, inert, number
+from mbma_tables.surfaces.any_surface import AnySurface
+
+SAID = {
+    "solid_conductance": "of the solid spots (contact conductance), over nominal area",
+    "gas_conductance": "of the gas in the gaps (gap conductance), over nominal area",
+    "total_conductance": "of solid spots and gas (joint conductance), over nominal area",
+    "tangential_stiffness": "shear stress over displacement before any slip",
+    "leakage": "flow coefficient K: K dp/(12 viscosity width) per length of seal, viscosity in stress times s",
+}
+GLIBC = "2.17"  # of Linux distributions from 2014 on
+# by zig's names of platforms: folders in FMI 2.0, which has none of ARM, and ends of libraries
+PLATFORMS = {
+    f"x86_64-linux-gnu.{GLIBC}": ("linux64", ".so"),
+    "x86_64-macos.10.13": ("darwin64", ".dylib"),
+    "x86_64-windows-gnu": ("win64", ".dll"),
+}
+INPUT = 1  # value reference of overclosure, after time
+
+
+def fmu(
+    surface: AnySurface,
+    E_star: float | str,
+    *,
+    name: str = "law",
+    binaries: str = "here",
+    **asked: Any,
+) -> bytes:
+    """A contact law as an FMU of FMI 2.0: overclosure in; pressure, tangent, area and energy out.
+
+    Parameters
+    ----------
+    surface, E_star, name, **asked
+        As for `law_text`; a conductivity adds the output solid_conductance, leakage the output leakage.
+    binaries : {"here", "all", "none"}
+        Beside the sources: a binary for this platform, by the system's C compiler or zig,
+        where one of them is installed; binaries for Linux, macOS and Windows on x86-64, by
+        zig (the extra "fmu"); or none. FMI 2.0 names no folder for ARM, where the importing
+        tool compiles the sources.
+
+    Returns
+    -------
+    bytes
+        The file, the same for the same law and compiler; its description lists the binaries, and the
+        C library that those for Linux need.
+
+    Raises
+    ------
+    InputError, OutOfRangeError
+        As `law_text`.
+
+    Examples
+    --------
+    >>> import io, zipfile
+    >>> from mbma_tables import Surface
+    >>> file = fmu(Surface.named("concrete"), "13.3 MPa", name="road", theory="calibrated", binaries="none")
+    >>> zipfile.ZipFile(io.BytesIO(file)).namelist()
+    ['modelDescription.xml', 'sources/road.c']
+    """
+    checked_name(
+        name, MAX_NAME, windows_words(), "Windows, where its files are named so,"
+    )
+    found = asked_law(surface, E_star, name, **asked)
+    law = text_of("c-law", found)
+    exported = found.exported
+    variables = _variables(found)
+    token = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, law)}}}"
+    parts = {
+        "LAW": law,
+        "NAME": name,
+        "TOKEN": token,
+        "START": variables[1]["start"],
+        "LEAKAGE": found.more.get("leakage", ""),
+        "GAS": "" if found.gas is None else "yes",
+        "SLOPED": "LAW" if found.sloped is exported.law else "ELASTIC",
+        "LEAST": number(exported.c_least, infinity="INFINITY"),
+        "MOST": number(exported.c_most),
+    }
+    source = filled(
+        "code/fmu.c",
+        {what: number(ratio) for what, ratio in found.slopes.items()},
+        **parts,
+    )
+    built = _binaries(name, source, binaries)
+    listed = (
+        ", ".join(map(_platform, built, built.values()))
+        or "none, sources only: the importing tool compiles them"
+    )
+    if binaries == "all":
+        listed += " (x86-64); on ARM the importing tool compiles the sources"
+    said = "\n".join(map(inert, (*found.said, f"binaries: {listed}")))
+    files = {
+        "modelDescription.xml": _description(name, token, said, variables, exported),
+        f"sources/{name}.c": source.encode(),
+    }
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for path, content in (files | built).items():
+            # without the time of writing: the same law is the same file
+            archive.writestr(zipfile.ZipInfo(path), content, zipfile.ZIP_DEFLATED)
+    return stream.getvalue()
+
+
+def _platform(path: str, binary: bytes) -> str:
+    """A binary's folder, and of Linux the C library that it needs, by the versions of its symbols."""
+    folder = path.split("/")[1]
+    versions = []
+    for major, minor in re.findall(rb"GLIBC_(\d+)\.(\d+)", binary):
+        versions.append((int(major), int(minor)))
+    if not versions:
+        return folder
+    major_needed, minor_needed = max(versions)
+    return f"{folder} (glibc {major_needed}.{minor_needed} and later)"
+
+
+def _binaries(name: str, source: str, asked: str) -> dict[str, bytes]:
+    """Shared libraries by their paths in the file, for the platforms asked for, as far as there is a compiler."""
+    if asked not in ("here", "all", "none"):
+        raise InputError(
+            f"binaries must be one of {('here', 'all', 'none')}, got {asked!r}"
+        )
+    zig = importlib.util.find_spec("ziglang")
+    system = f"{platform.machine()} {sys.platform}".lower()
+    if asked == "all" and zig is None:
+        raise InputError(
+            "binaries for all platforms are compiled by ziglang: pip install ziglang"
+        )
+    here = {
+        "x86_64 linux": "linux64",
+        "x86_64 darwin": "darwin64",
+        "amd64 win32": "win64",
+    }.get(system)
+    found = {}
+    for target, (folder, end) in PLATFORMS.items():
+        # a file for all platforms is for others' machines, whose C library may be older
+        # than that of this one
+        own_cc = asked == "here" and folder == here and shutil.which("cc")
+        if not (own_cc or zig) or asked == "none" or (asked == "here" and folder != here):
+            continue
+        command = (
+            ["cc"]
+            if own_cc
+            else [sys.executable, "-m", "ziglang", "cc", "-target", target, "-s"]
+        )
+        command += [
+            "-w",
+            "-O2",
+            "-shared",
+            "-DMBMA_WITHOUT_HEADERS",
+            *([] if end == ".dll" else ["-fPIC"]),
+        ]
+        with contextlib.suppress(*([BuildError] if asked == "here" else [])):
+            found[f"binaries/{folder}/{name}{end}"] = built_by(
+                command, {f"{name}.c": source}, f"{name}{end}", "-lm"
+            )
+    return found
+
+
+def _variables(found: AskedLaw) -> list[dict[str, str]]:
+    """XML attributes of each variable, by value reference."""
+    exported = found.exported
+    length = exported.length
+    stress = exported.stress
+    asked = {
+        "start": number(0.0 if exported.ends else max(0.0, exported.c_least)),
+        "max": number(exported.c_most),
+    }
+    asked |= {} if exported.ends else {"min": number(exported.c_least)}
+    outputs = {
+        "pressure": (stress, "force over nominal area"),
+        "tangent": (f"{stress}/{length}", "derivative of pressure by overclosure"),
+        "area": ("1", "area of contact over nominal area"),
+        "energy": (f"{stress} {length}", "integral of pressure over overclosure"),
+        **{name: (unit, SAID[name]) for name, unit in found.more.items()},
+    }
+    said = "h_max less the mean separation"
+    return [
+        {"name": "time", "causality": "independent", "unit": "s"},
+        {
+            "name": "overclosure",
+            "causality": "input",
+            "unit": length,
+            "description": said,
+            **asked,
+        },
+        *(
+            {"name": n, "causality": "output", "unit": u, "description": said}
+            for n, (u, said) in outputs.items()
+        ),
+    ]
+
+
+def _description(
+    name: str,
+    token: str,
+    text: str,
+    variables: list[dict[str, str]],
+    exported: ExportedLaw,
+) -> bytes:
+    """modelDescription.xml."""
+    length = exported.length
+    stress = exported.stress
+    facts = {"fmiVersion": "2.0", "modelName": name, "guid": token, "description": text}
+    facts |= {
+        "generationTool": f"mbma_tables {__version__}",
+        "variableNamingConvention": "flat",
+    }
+    root = ET.Element("fmiModelDescription", facts)
+    provides = {"modelIdentifier": name, "providesDirectionalDerivative": "true"}
+    for kind, more in (
+        ("ModelExchange", {}),
+        ("CoSimulation", {"canHandleVariableCommunicationStepSize": "true"}),
+    ):
+        interface = ET.SubElement(root, kind, provides | more)
+        ET.SubElement(
+            ET.SubElement(interface, "SourceFiles"), "File", {"name": f"{name}.c"}
+        )
+    # by units of SI
+    metre = factor(length, "m")
+    pascal = factor(stress, "Pa", "stress")
+    bases: dict[str, tuple[dict[str, int], float]] = {
+        "s": ({"s": 1}, 1.0),
+        "1": ({}, 1.0),
+        length: ({"m": 1}, metre),
+        stress: ({"kg": 1, "m": -1, "s": -2}, pascal),
+        f"{stress}/{length}": ({"kg": 1, "m": -2, "s": -2}, pascal / metre),
+        f"{stress} {length}": ({"kg": 1, "s": -2}, pascal * metre),
+        f"{length}^3": ({"m": 3}, metre**3),
+    }
+    units = ET.SubElement(root, "UnitDefinitions")
+    for unit in dict.fromkeys(variable["unit"] for variable in variables):
+        named = ET.SubElement(units, "Unit", {"name": unit})
+        if unit in bases:
+            powers, size = bases[unit]
+            base = {key: str(power) for key, power in powers.items()} | {
+                "factor": number(size)
+            }
+            ET.SubElement(named, "BaseUnit", base)
+    categories = ET.SubElement(root, "LogCategories")
+    for category in ("logStatusDiscard", "logStatusError"):
+        ET.SubElement(categories, "Category", {"name": category})
+    listed = ET.SubElement(root, "ModelVariables")
+    structure = ET.SubElement(root, "ModelStructure")
+    of_real = ("unit", "start", "min", "max")
+    for reference, all_of in enumerate(variables):
+        outer = {"valueReference": str(reference), "variability": "continuous"}
+        outer |= {key: value for key, value in all_of.items() if key not in of_real}
+        inner = {key: all_of[key] for key in of_real if key in all_of}
+        ET.SubElement(ET.SubElement(listed, "ScalarVariable", outer), "Real", inner)
+    for kind in ("Outputs", "InitialUnknowns"):
+        parent = ET.SubElement(structure, kind)
+        for place in range(INPUT + 2, len(variables) + 1):  # in the list, from 1
+            ET.SubElement(
+                parent, "Unknown", {"index": str(place), "dependencies": str(INPUT + 1)}
+            )
+    ET.indent(root)
+    return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))
+
+
+TARGETS = (Target("fmu", fmu, CODE | {"binaries"}, rows=False),)

@@ -1,0 +1,44 @@
+"""Laws as user subroutines of Abaqus/Standard: UINTER and GAPCON."""
+
+from mbma_tables.export.code.subroutine import LAST_VALUE, several_laws, subroutine
+
+CALLED = (
+    "{name}.c is C99, also C++11. Written from the manual's list of arguments and called with "
+    "it by a program of the tests; not run in Abaqus."
+)
+# Abaqus has a routine that ends the job
+STOP = {
+    "STOP_DECLARED": (
+        "SUBROUTINE FOR_NAME(xit, XIT)(void); /* of Abaqus, closes its files */"
+    ),
+    "STOP": "FOR_NAME(xit, XIT)()",
+}
+
+LANGUAGES = {
+    "abaqus-uinter": subroutine(
+        "uinter",
+        usage=(
+            "WITHOUT FRICTION: the faces slide freely. *SURFACE INTERACTION, "
+            "NAME={interface}, USER: abaqus job=... user={name}.c. "
+            f"{several_laws('uinter')} "
+            "Place the bodies so that their surfaces touch where the mean planes are h_max "
+            "apart. Beyond the law's range the increment is tried again with a smaller step. A "
+            "linear perturbation step stops the program: for modes of a preloaded joint take "
+            "the tangent at its pressure, from this file, as a spring's stiffness. "
+            f"{CALLED} Arguments: Abaqus 2017, user subroutines, UINTER."
+        ),
+        parts=STOP,
+        frictionless=True,
+    ),
+    "abaqus-gapcon": subroutine(
+        "gapcon",
+        usage=(
+            "*GAP CONDUCTANCE, USER of *SURFACE INTERACTION, NAME={interface}: abaqus job=... "
+            "user={name}.c, beside a table of pressures. "
+            f"{several_laws('gapcon')} {LAST_VALUE} {CALLED} "
+            "Arguments: Abaqus 6.5 to 2017, user subroutines, GAPCON."
+        ),
+        parts={"SOLVER": "Abaqus/Standard", **STOP},
+        conductance_alone=True,
+    ),
+}

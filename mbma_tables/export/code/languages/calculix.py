@@ -1,0 +1,28 @@
+"""Laws as a user subroutine of CalculiX: GAPCON."""
+
+from mbma_tables.export.code.subroutine import LAST_VALUE, several_laws, subroutine
+
+LANGUAGES = {
+    "calculix-gapcon": subroutine(
+        "gapcon",
+        usage=(
+            "*GAP CONDUCTANCE, USER of *SURFACE INTERACTION, NAME={interface}, in place of "
+            "CalculiX's gapcon.f: in its sources cc -O2 -c {name}.c -o gapcon.o, ar r "
+            "ccx_2.20.a gapcon.o, and make, which links ccx again. Use it with *CONTACT PAIR, "
+            "TYPE=SURFACE TO SURFACE and *SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL "
+            "or LINEAR: with NODE TO SURFACE 2.20 hands over another pressure, without a "
+            "message, and with TABULAR it has no force. EXPONENTIAL, which `mbma export "
+            "calculix --conductivity` fits to this law, gives closure and conductance in one "
+            f"interaction. {several_laws('gapcon')} {LAST_VALUE} "
+            "{name}.c is C99, also C++11. Run in ccx 2.20. Arguments: CalculiX 2.7 to 2.20, "
+            "gapcon.f."
+        ),
+        # its own routines end the job by an exit status
+        parts={
+            "SOLVER": "CalculiX",
+            "STOP_DECLARED": "",
+            "STOP": "exit(201) /* as CalculiX's own routines do */",
+        },
+        conductance_alone=True,
+    )
+}

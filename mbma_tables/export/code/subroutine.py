@@ -1,0 +1,48 @@
+"""User subroutines of solvers in C: a law in the shape that a solver calls."""
+
+import functools
+from collections.abc import Mapping
+
+from mbma_tables.export.code.core_code import core_places
+from mbma_tables.export.code.language import Language
+from mbma_tables.export.text import number
+
+LAST_VALUE = (
+    "At pressures beyond the law's range the last value is used, with one warning on "
+    "stderr."
+)
+# of a solver's surface interactions, by the names of its routine
+_INTERACTIONS = (
+    "Surface interactions of other names stop the job. Several laws in one job, each exported "
+    "under a name of its own: begin a file with the line #define {routine}_INTERFACES "
+    'INTERFACE("{{interface}}", {{name}}) INTERFACE("SEAL", seal) and go on with the contents '
+    "of {{name}}.c and seal.c, or #include both; the text in quotes is the name of the "
+    "surface interaction, the other one that of the law."
+)
+
+
+def several_laws(routine: str) -> str:
+    """How several laws are used in one job, for the user of a routine."""
+    return _INTERACTIONS.format(routine=routine.upper())
+
+
+def subroutine(
+    routine: str,
+    usage: str,
+    parts: Mapping[str, str],
+    conductance_alone: bool = False,
+    frictionless: bool = False,
+) -> Language:
+    """The C of a law with a routine, whose template is languages/ROUTINE.c."""
+    return Language(
+        template="code/languages/law.c",
+        mark="/*",
+        usage=usage,
+        call="{name}_{what}({x})",
+        law_places=core_places,
+        number=functools.partial(number, infinity="INFINITY"),
+        parts=parts,
+        subroutine=routine,
+        conductance_alone=conductance_alone,
+        frictionless=frictionless,
+    )

@@ -1,0 +1,1 @@
+"""The model and its tables as C, and formulas of tables."""

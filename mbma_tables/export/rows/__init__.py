@@ -1,0 +1,1 @@
+"""Laws as rows of numbers, for solvers and as data."""

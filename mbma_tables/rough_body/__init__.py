@@ -1,1 +1,0 @@
-"""Rough spheres and cylinders on a flat."""

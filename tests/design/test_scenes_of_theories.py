@@ -1,0 +1,294 @@
+"""Scenes by any theory, and with the effect `yield`: what they answer, how they ask, and what is MBMA's alone."""
+
+import json
+
+import numpy as np
+import pytest
+from helpers import Springs, contact_of, refusals
+
+from mbma_tables import Bodies, InputError, Scene, Surface, contact
+from mbma_tables.bodies.bodies import mean_conductivity
+from mbma_tables.theories import THEORIES, Mbma
+
+CONCRETE = Surface.named("concrete")
+MODULUS = 13.3
+PRESSURES = [0.01, 0.1]
+QUANTITIES = ("pressure", "area", "stiffness", "energy", "solid_conductance")
+each = pytest.mark.parametrize("theory", THEORIES)
+
+
+def scene_of(theory, **more):
+    given = {"effects": ("pressure", "area"), "E_star": MODULUS, "rtol": 1e-4} | more
+    return Scene(CONCRETE, theory=theory, **given)
+
+
+@pytest.mark.parametrize(
+    "theory", [*THEORIES, Springs()], ids=lambda t: getattr(t, "name", t)
+)
+def test_quantities_at_a_pressure_are_the_contacts(theory):
+    found = scene_of(
+        theory, effects=QUANTITIES, pressures=PRESSURES, conductivities=(1.0, 3.0)
+    ).run()
+    truth = contact(CONCRETE, MODULUS, pressure=PRESSURES, theory=theory)
+    expected = {
+        "separation": truth.separation,
+        "mean_separation": truth.mean_separation,
+        "pressure": PRESSURES,
+        "area": truth.area,
+        "stiffness": truth.stiffness,
+        "energy": truth.energy,
+        "solid_conductance": 1.5 / MODULUS * truth.stiffness,
+        "nominal_pressure": PRESSURES,
+    }
+    for name, values in expected.items():
+        assert found[name].values == pytest.approx(values, rel=1e-4), name
+    assert found.attrs["theory"] == getattr(theory, "name", theory)
+    assert (found.attrs["variant"] == "") == (theory != "mbma")
+
+
+@each
+@pytest.mark.parametrize(
+    "prescribed",
+    [{"pressures": PRESSURES}, {"mean_separations": np.linspace(0.3, 1.0, 50)}],
+)
+def test_time_budgets(theory, prescribed):
+    ample = scene_of(theory, rtol=None, seconds=60.0, **prescribed)
+    plan = ample.plan()
+    assert plan.error <= plan.rtol
+    assert plan.seconds <= 60
+    assert ample.run().attrs["error"] <= plan.rtol
+    # the same scene at the tolerance found states the same cost
+    assert scene_of(theory, rtol=plan.rtol, **prescribed).plan().seconds == plan.seconds
+    with pytest.raises(
+        InputError,
+        match=r"seconds = 1e-08 is too little: the cheapest plan takes about \d",
+    ):
+        scene_of(theory, rtol=None, seconds=1e-8, **prescribed).plan()
+
+
+@each
+def test_many_gaps_go_through_the_law_where_that_costs_less(theory):
+    u = np.linspace(0.3, 1.0, 200_000)
+    own = contact(
+        CONCRETE, mean_separation=[0.5, 0.99 * CONCRETE.h_max], theory=theory
+    ).error.max()
+    rtol = max(1e-5, 3 * own)
+    some = slice(None, None, 3700)
+    truth = contact(CONCRETE, MODULUS, mean_separation=u[some], theory=theory)
+    for asked, by_law, seen in ((u, True, some), (u[some], False, slice(None))):
+        scene = scene_of(theory, mean_separations=asked, rtol=rtol)
+        (step,) = scene.plan().steps
+        assert (step.name == "law") == (by_law and theory != "mbma")
+        found = scene.run()
+        assert found["pressure"].values[seen] == pytest.approx(truth.pressure, rel=rtol)
+        assert found["area"].values[seen] == pytest.approx(truth.area, rel=rtol)
+    # slopes are the theory's own
+    slopes = scene_of(
+        theory, effects=("stiffness",), mean_separations=u[some], rtol=rtol
+    ).run()
+    assert slopes["stiffness"].values == pytest.approx(truth.stiffness, rel=1e-5)
+
+
+@each
+def test_validity_is_an_effect(theory):
+    # of gaps that are numbers, so that both are asked the same
+    u = (CONCRETE.h_max + np.array([0.5, -1.0])) / 2
+    scene = scene_of(theory, effects=("pressure", "validity"), mean_separations=u)
+    text = scene.explain()
+    found = scene.run()
+    assert f"  theory: {theory}\n" in text
+    assert (
+        "-> contact by universal" if theory == "mbma" else f"-> contact by {theory}"
+    ) in text
+    truth = contact(CONCRETE, mean_separation=u, theory=theory)
+    assert found["valid"].values.tolist() == truth.valid.tolist()
+    np.testing.assert_array_equal(found["scatter"], truth.scatter)
+    np.testing.assert_array_equal(found["area_scatter"], truth.area_scatter)
+    assert set(json.loads(found.attrs["reasons"])) == set(truth.reasons)
+    assert "valid" not in scene_of(theory, mean_separations=u).run()
+
+
+test_what_is_refused = refusals(
+    lambda more: scene_of(**({"theory": "persson", "separations": [0.5]} | more)).run(),
+    ({"theory": "person"}, "no theory is named 'person'; did you mean 'persson'"),
+    ({"island_model": "exact"}, "island_model: of theory 'mbma', not of 'persson'"),
+    ({"variant": "printed"}, "variant: of theory 'mbma'"),
+    ({"without": ("sphere_deformation",)}, "without: of theory 'mbma'"),
+    ({"effects": ("island_statistics",)}, "effect 'island_statistics': of theory 'mbma'"),
+    (
+        {"effects": ("comparison",), "theories": ("persson",)},
+        "by theory 'persson' itself",
+    ),
+    (
+        {"areas": [0.1]},
+        "prescribe one of separations, mean_separations, pressures, areas",
+    ),
+    ({"separations": None, "areas": [-0.1]}, "areas must be at least 0"),
+    ({"theory": 3}, "theory must be one of"),
+)
+
+
+SURFACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
+PRESSED = {"surface": SURFACE, "pressures": [1.0, 30.0], "E_star": 100e3}
+
+
+@pytest.mark.parametrize("theory", ["calibrated", "mbma"])
+def test_a_scene_yields_as_contact_does(theory):
+    effects = ["pressure", "area", "stiffness", "solid_conductance", "validity", "yield"]
+    scene = Scene(
+        **PRESSED,
+        effects=effects,
+        hardness=1500.0,
+        theory=theory,
+        conductivities=(16.0, 167.0),
+    )
+    step = scene.plan().steps[0]
+    assert "yield" in step.why
+    assert step.error < 1e-4
+    found = scene.run()
+    known = contact(
+        SURFACE,
+        Bodies(100e3, hardness=1500.0),
+        pressure=PRESSED["pressures"],
+        theory=theory,
+    )
+    for name in (
+        "area",
+        "yielded",
+        "mean_pressure",
+        "plane_separation",
+        "unloading_stiffness",
+    ):
+        assert found[name].values == pytest.approx(getattr(known, name), rel=1e-6), name
+    assert found.attrs["psi"] == pytest.approx(known.psi)
+    assert found.stiffness.values == pytest.approx(known.stiffness, rel=1e-6)
+    own = mean_conductivity(16.0, 167.0) / 100e3 * known.unloading_stiffness
+    assert found.solid_conductance.values == pytest.approx(own, rel=1e-6)
+    assert found.separation_scatter.values == pytest.approx(
+        known.separation_scatter, rel=1e-6
+    )
+    assert (
+        found.solid_conductance.values
+        > 1.05 * mean_conductivity(16.0, 167.0) / 100e3 * known.stiffness
+    ).all()
+
+
+@pytest.mark.parametrize("cap", [{}, {"hardness": 1500.0}], ids=["elastic", "yield"])
+def test_theories_beside_one_another(cap):
+    asked = {"mean_separations": [0.5, 1.5], "E_star": 100e3} | cap
+    others = ["persson", "calibrated"]
+    effects = ["pressure", "area", "comparison", *(["yield"] if cap else [])]
+    found = Scene(SURFACE, effects, theories=others, theory="mbma", **asked).run()
+    for name in others:
+        known = contact_of(SURFACE, 100e3, mean_separation=[0.5, 1.5], theory=name, **cap)
+        for quantity in ("pressure", "area"):
+            assert found[f"{name}_{quantity}"].values == pytest.approx(
+                getattr(known, quantity), rel=1e-9
+            )
+    elastic = Scene(**PRESSED, effects=["area"], theory="calibrated").run()
+    known = contact(SURFACE, 100e3, pressure=1.0, theory="calibrated")
+    assert elastic.attrs["elastic_hardness"] == pytest.approx(known.elastic_hardness)
+    assert f"elastic_hardness {float(known.elastic_hardness):.4g}" in repr(known)
+
+
+def test_a_file_may_call_for_it():
+    content = {
+        "surface": {
+            "hurst": 0.8,
+            "q0": 0.01,
+            "q1": 2.0,
+            "h_rms": 1.0,
+            "h_max": 3.0,
+            "length_unit": "um",
+        },
+        "material": {"E_star": "100 GPa"},
+        "theory": "calibrated",
+        "effects": {"on": ["area", "yield", "solid_conductance"]},
+        "yield": {"hardness": "1500 MPa"},
+        "solid_conductance": {"k1": "16 W/(m K)", "k2": "167 W/(m K)"},
+        "prescribed": {"pressures": ["30 MPa"]},
+    }
+    found = Scene.from_mapping(content).run()
+    known = contact(
+        SURFACE,
+        Bodies(100e3, hardness=1500.0, conductivity=(16.0, 167.0)),
+        pressure=30.0,
+        theory="calibrated",
+    )
+    assert found.area.values == pytest.approx([known.area], rel=1e-9)
+    assert found.unloading_stiffness.units == "GPa/um"
+    assert found.solid_conductance.units == "W/(m^2 K)"
+    assert found.solid_conductance.values == pytest.approx(
+        [1e6 * known.solid_conductance], rel=1e-9
+    )
+
+
+test_what_contradicts = refusals(
+    lambda more: Scene(**PRESSED, **more),
+    ({"effects": ["area", "yield"]}, "effect 'yield' needs hardness"),
+    ({"hardness": 1500.0}, "hardness given and effect 'yield' is off"),
+    (
+        {"effects": ["energy", "yield"], "hardness": 1500.0},
+        "'energy' is for elastic contacts",
+    ),
+    (
+        {"effects": ["area", "yield"], "hardness": 1500.0, "without": ["finite_height"]},
+        "is for elastic contacts",
+    ),
+    (
+        {"effects": ["area", "yield"], "hardness": 20.0},
+        "pressures must be at most the hardness",
+    ),
+    ({"effects": ["area", "yield"], "hardness": -1.0}, "hardness must be a number in"),
+)
+
+
+def test_a_plan_of_mbma_that_yields_keeps_the_tolerance():
+    known = {
+        "surface": SURFACE,
+        "mean_separations": [1.0],
+        "effects": ["pressure", "yield"],
+        "hardness": 0.01,
+    }
+    known |= {"theory": "mbma"}
+    for rtol, island_model in ((1e-6, "universal"), (1e-10, "exact")):
+        scene = Scene(**known, rtol=rtol)
+        assert scene.plan().error <= rtol
+        found = scene.run()
+        assert found.attrs["error"] <= rtol
+        assert json.loads(found.attrs["island_models"]) == {"contact": island_model}
+        assert list(json.loads(found.attrs["table_hashes"])) == [island_model] * (
+            island_model == "universal"
+        )
+    for unknown, name in ((known, "mbma"), (known | {"theory": Springs()}, "springs")):
+        with pytest.raises(
+            InputError,
+            match=f"the cost of theory '{name}' is not known: give rtol instead of seconds",
+        ):
+            Scene(**unknown, seconds=10.0).plan()
+
+
+def test_options_of_mbma_as_an_object_are_those_of_the_scene():
+    asked = {"separations": [0.5, 0.7], "without": ["subscale_area"]}
+    options = {"island_model": "exact", "variant": "printed", "rtol": 1e-4}
+    named = Scene(CONCRETE, theory="mbma", **options, **asked).run()
+    for scene in (
+        Scene(CONCRETE, theory=Mbma(**options), **asked),
+        Scene(
+            CONCRETE,
+            theory=Mbma(variant="printed"),
+            **asked,
+            rtol=1e-4,
+            island_model="exact",
+        ),
+    ):
+        found = scene.run()
+        for name in ("theory", "variant", "rtol"):
+            assert found.attrs[name] == named.attrs[name]
+        np.testing.assert_array_equal(found["pressure"], named["pressure"])
+    for given, said in (
+        ({"theory": Mbma(rtol=1e-4), "rtol": 1e-6}, "rtol is given by the scene and by"),
+        ({"theory": Mbma(outside="nan")}, "outside: a scene solves"),
+    ):
+        with pytest.raises(InputError, match=said):
+            Scene(CONCRETE, **asked, **given)
