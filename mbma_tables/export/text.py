@@ -6,7 +6,7 @@ import pathlib
 import re
 import shlex
 import textwrap
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Iterable
 from typing import Any, SupportsFloat
 
 import numpy as np
@@ -87,34 +87,28 @@ def page_file(name: str) -> bytes:
 
 
 def template(name: str) -> str:
-    """The text of a template, named from this folder on, with its places."""
-    return (_ROOT / f"{name}.in").read_text(encoding="utf-8")
+    """The text of a template of jinja, named from this folder on, without the end of its name."""
+    return (_ROOT / f"{name}.jinja").read_text(encoding="utf-8")
 
 
-def filled(name: str, each: Mapping[str, str] = {}, /, **parts: str) -> str:
-    """A template with its places, such as @HEADER@, filled in; @IF PLACE@ ... @END@ stays where that is not empty.
+def filled(name: str, /, **parts: Any) -> str:
+    """A template with its places filled in; a place that nothing is given for is an error."""
+    return str(_templates().from_string(template(name)).render(parts))
 
-    @EACH@ ... @END@ is repeated for each function that is a slope times a ratio: @WHAT@,
-    @PLACE@ and @RATIO@.
-    """
-    chosen = re.compile(r"@(?:IF ([A-Z]+)|EACH)@(\n)?(.*?)@END@(?(2)\n)", re.S)
 
-    def repeated(text: str) -> str:
-        places = (
-            (("@WHAT@", what), ("@PLACE@", what.upper()), ("@RATIO@", ratio))
-            for what, ratio in each.items()
-        )
-        return "".join(
-            functools.reduce(lambda part, place: part.replace(*place), own, text)
-            for own in places
-        )
+@functools.cache
+def _templates() -> Any:
+    """The templates' settings; jinja is imported when first needed."""
+    import jinja2
 
-    text = chosen.sub(
-        lambda found: (parts[found[1]] and found[3]) if found[1] else repeated(found[3]),
-        template(name),
+    # lines that are tags alone leave nothing behind
+    return jinja2.Environment(
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,  # code, not a page
     )
-    # in one pass: a header may hold such a name itself
-    return re.sub("@([A-Z_]+)@", lambda place: parts[place[1]], text)
 
 
 def written_by(words: Iterable[str], command: str = "export") -> str:

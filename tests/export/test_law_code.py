@@ -788,7 +788,7 @@ def test_c_of_a_polynomial_over_many_decades(tmp_path):
 
 @pytest.mark.parametrize("target", LAWS)
 def test_a_unit_never_becomes_code(target):
-    hostile = 'W */ int evil(void); /* @NAME@ {name} """ system(\'evil\') <!-- %'
+    hostile = 'W */ int evil(void); /* {{ NAME }} {name} """ system(\'evil\') <!-- %'
     mark = LANGUAGES[target].mark
     live = [
         [

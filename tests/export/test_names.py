@@ -33,7 +33,7 @@ ROAD = Surface.named("concrete")
 # is cleared
 HOSTILE = (
     'coding:unicode_escape \nraise SystemExit(7) # -*- coding: utf-7 -*- */ vim: set ex: """ \r\x1b[2J'
-    " ??/ --> %} ]] </script> ' \" { @NAME@ \\"
+    " ??/ --> %} ]] </script> ' \" { {{ NAME }} {% if x %} \\"
 )
 
 

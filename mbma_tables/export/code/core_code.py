@@ -56,7 +56,7 @@ def core_places(asked: AskedLaw, places: Mapping[str, str]) -> dict[str, str]:
     leakage = asked.more.get("leakage", "")
     declared = filled(
         "code/languages/law.h",
-        dict.fromkeys(asked.slopes, ""),
+        each=dict.fromkeys(asked.slopes, ""),
         HEADER="",
         NAME=name,
         LEAKAGE=leakage,

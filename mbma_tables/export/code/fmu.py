@@ -101,7 +101,7 @@ def fmu(
     }
     source = filled(
         "code/fmu.c",
-        {what: number(ratio) for what, ratio in found.slopes.items()},
+        each={what: number(ratio) for what, ratio in found.slopes.items()},
         **parts,
     )
     built = _binaries(name, source, binaries)

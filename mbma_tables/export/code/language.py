@@ -71,7 +71,7 @@ class Language:
     # places of the template that hold the law itself, from the law and the other places
     law_places: Callable[[AskedLaw, Mapping[str, str]], dict[str, str]]
     number: Callable[[float], str] = number
-    # functions for which @EACH@ is repeated, by default those that are slopes times a ratio
+    # `each` of the template, functions and numbers, by default those that are slopes times a ratio
     repeated: Callable[[AskedLaw], dict[str, str]] | None = None
     parts: Mapping[str, str] = dataclasses.field(default_factory=dict)  # other places
     # the flow where contact blocks it: not known from an overclosure on, and none

@@ -217,9 +217,8 @@ def text_of(target: str, asked: AskedLaw, file: Beside | None = None) -> str:
     template = language.template
     if file is not None and file.template:
         template = file.template
-    if language.repeated is None:
-        return filled(template, language.ratios(asked), **places)
-    return filled(template, language.repeated(asked), **places)
+    repeated = language.repeated or language.ratios
+    return filled(template, each=repeated(asked), **places)
 
 
 def _common_places(language: Language, asked: AskedLaw) -> dict[str, str]:

@@ -2,7 +2,9 @@
 
 import re
 
-WORD = re.compile(r"(?<![@\w])[A-Za-z]\w*(?![@\w])")
+WORD = re.compile(r"\b[A-Za-z]\w*")
+# tags of a template, and its places with the names that they are parts of
+_OF_TEMPLATES = r"\{%.*?%\}|\w*\{\{.*?\}\}\w*"
 
 # of MATLAB and of Octave
 MATLAB_KEYWORDS = """
@@ -25,7 +27,8 @@ def small_words(*texts: str) -> frozenset[str]:
 
 def words_of_code(text: str, mark: str) -> str:
     """Names and key words of source code, without comments, texts and the places of a template."""
-    code = re.sub(rf"{mark}.*|\"[^\"\n]*\"|(?<!\w)'[^'\n]*'|\{{\w+\}}", " ", text)
+    plain = re.sub(_OF_TEMPLATES, " ", text)
+    code = re.sub(rf"{mark}.*|\"[^\"\n]*\"|(?<!\w)'[^'\n]*'", " ", plain)
     return " ".join(WORD.findall(code))
 
 

@@ -49,7 +49,9 @@ def _law_places(asked: AskedLaw, places: Mapping[str, str]) -> dict[str, str]:
         return polynomials | {"SLOPED": "tangent"}
     elastic = law_places(asked.sloped, _notation)
     only = {"NAME": "elastic", "HEADER": "", "LEAKAGE": "", "GAS": "", "ELASTIC": ""}
-    text = filled(TEMPLATE, **{**places, **polynomials, **elastic, **only}).strip()
+    text = filled(
+        TEMPLATE, each={}, **{**places, **polynomials, **elastic, **only}
+    ).strip()
     # some tools confuse names of a package with those of one in it
     names = "|".join(
         constant or function for constant, function in _DEFINED.findall(text)
