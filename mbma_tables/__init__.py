@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from mbma_tables.design.joint import Joint as Joint
     from mbma_tables.design.scenes.scene import Scene as Scene
     from mbma_tables.design.sensitivity import sensitivity as sensitivity
+    from mbma_tables.design.uncertainty import uncertainty as uncertainty
     from mbma_tables.effects.film import FlowFactors as FlowFactors
     from mbma_tables.effects.film import flow_factors as flow_factors
     from mbma_tables.effects.rough_contact import RoughContact as RoughContact
@@ -56,6 +57,7 @@ _HOMES = {
     "open_table": "mbma_tables.tables.open",
     "rough_contact": "mbma_tables.effects.rough_contact",
     "sensitivity": "mbma_tables.design.sensitivity",
+    "uncertainty": "mbma_tables.design.uncertainty",
     # modules
     "greenwood_tripp": "mbma_tables.islands.greenwood_tripp",
     "materials": "mbma_tables.bodies.materials",

@@ -86,28 +86,34 @@ class Line(NamedTuple):
     name: str
     values: FloatArray
     scatter: FloatArray | None = None  # standard deviation of ln of the values
+    #: in place of it the lower and the upper end of the band
+    ends: tuple[FloatArray, FloatArray] | None = None
 
 
 def draw_panels(
     x: FloatArray,
     panels: Mapping[str, Sequence[Line]],
     x_label: str,
+    title: str = "bands: one standard deviation of the model",
 ) -> Figure:
-    """Panels by their ordinate's label."""
+    """Panels by their ordinate's label, under a title on their bands."""
     figure = new_figure(5 * (len(panels) + 1) // 2, 8)
     for axes, (label, lines) in zip(
         figure.subplots(2, -(-len(panels) // 2)).flat, panels.items(), strict=False
     ):
-        for name, y, scatter in lines:
+        for name, y, scatter, ends in lines:
             axes.loglog(x, y, label=name)
             _band(axes, x, y, scatter)
+            if ends is not None:
+                colour = axes.lines[-1].get_color()
+                axes.fill_between(x, *ends, alpha=0.25, color=colour, lw=0)
         axes.set(xlabel=x_label, ylabel=label)
         axes.grid(True, which="major", alpha=0.3)
         _number_ticks(axes)
         if len(lines) > 1:
             axes.legend()
     if any(axes.collections for axes in figure.axes):
-        figure.suptitle("bands: one standard deviation of the model", fontsize="medium")
+        figure.suptitle(title, fontsize="medium")
     return figure
 
 

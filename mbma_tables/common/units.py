@@ -89,6 +89,8 @@ _CONDUCTIVITY = re.compile(r"([umkM]?)(?:(W)/([a-z]+)/?K|(S)/([a-z]+))")
 _ASCII = str.maketrans(
     {"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "²": "2"}
 )
+#: what ranges and means with a deviation have between their numbers
+RANGE = re.compile(r"\.\.|\+-|\+/-|\N{PLUS-MINUS SIGN}")
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(.*)", re.DOTALL)
 
 
@@ -124,6 +126,11 @@ def factor(have: str, want: str, kind: str = "length", power: int = 1) -> float:
 def read(name: str, text: str) -> tuple[float, str | None]:
     """A number and the unit of length or stress that a text gives it, None where it gives none."""
     match = _NUMBER.fullmatch(text)
+    if RANGE.search(text):
+        raise InputError(
+            f"{name} = {text[:60]!r} is a range, and one number is needed here: Joint and "
+            "uncertainty take ranges"
+        )
     if match is None:
         raise InputError(
             f"{name} must be a number, or one with its unit, got {text[:60]!r}"

@@ -60,6 +60,12 @@ CURVES = ("mean_separation", "pressure", "area")
 CONDUCTANCES = ("total_conductance", "solid_conductance", "gas_conductance")
 
 
+def panel_label(name: str, unit: str) -> str:
+    """Label of the panel of a quantity."""
+    label = PANELS.get(name, name.rpartition("_")[2])
+    return label if unit == "1" else f"{label} [{unit}]"
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Setup:
     """What is in contact: a surface, bodies, what is between them, and the theory of the elastic contact."""
@@ -506,9 +512,7 @@ class Contact(State, Displayed):
                 scatter = (scatter / values if name == "mean_separation" else scatter)[
                     order
                 ]
-            unit = declared.unit(self)
-            label = PANELS.get(name, name.rpartition("_")[2])
-            label += "" if unit == "1" else f" [{unit}]"
+            label = panel_label(name, declared.unit(self))
             lines.setdefault(label, []).append(
                 Line(name.replace("_", " "), values[order], scatter)
             )

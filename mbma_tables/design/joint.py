@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.bodies.bodies import Bodies, BodiesInUnits, is_array, names_metals
 from mbma_tables.bodies.materials import Pair, effective_modulus, tangential_ratio
 from mbma_tables.common.arguments import (
+    FloatArray,
     any_labelled,
     broadcast_shape,
     finite_array,
@@ -26,6 +27,12 @@ from mbma_tables.common.arguments import (
     spread,
 )
 from mbma_tables.common.display import Displayed, Variable, dataset_of, saved, shown
+from mbma_tables.common.distributions import (
+    Distribution,
+    distributions_in,
+    of_all,
+    with_numbers,
+)
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.plots import draw_panels
 from mbma_tables.common.toml_files import read_toml
@@ -54,6 +61,19 @@ from mbma_tables.design.sensitivity import (
     Unknowns,
     relative_derivatives,
     unknowns_of,
+)
+from mbma_tables.design.uncertainty import (
+    DRAWS,
+    LEVELS,
+    Description,
+    Pressed,
+    Replica,
+    Uncertainty,
+    bodies_of_entries,
+    entries_of_bodies,
+    replicas_of,
+    require_inputs,
+    uncertainty_of,
 )
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import TOPS
@@ -134,6 +154,12 @@ class Joint(JointQuantities, Displayed):
         The equivalent surface of both parts.
     pair : Pair or None
         The metals, where they are named.
+    inputs : dict
+        Numbers that are not known, by place such as "part_a.Ra". Numbers of the parts (not
+        of maps), `nominal_area`, constants of `bodies` and those of the gas may be ranges,
+        "0.25..2.5 mm", means with a standard deviation, "1.6 um +- 0.2 um", or measured
+        values, {"measured": ["1.5 um", "1.7 um"]}. Tables and plots then have quantiles, as
+        `uncertainty`; `central` is the joint of the medians.
 
     Raises
     ------
@@ -179,9 +205,17 @@ class Joint(JointQuantities, Displayed):
     theory: str | Theory | None = None
     surface: AnySurface = dataclasses.field(init=False)
     interface: Interface = dataclasses.field(init=False)
+    inputs: dict[str, Distribution] = dataclasses.field(init=False)
     _faces: dict[str, AnySurface] = dataclasses.field(init=False)
+    _central: Joint | None = dataclasses.field(init=False)
 
     def __post_init__(self) -> None:
+        inputs = dict(distributions_in(self._entries))
+        object.__setattr__(self, "inputs", inputs)
+        if inputs:
+            self._take_medians()
+            return
+        object.__setattr__(self, "_central", None)
         faces = {}
         for name in FACES:
             part = getattr(self, name)
@@ -206,9 +240,131 @@ class Joint(JointQuantities, Displayed):
         self._check()
 
     @property
+    def _entries(self) -> dict[str, Any]:
+        """What was typed, of which numbers may be distributions."""
+        names = (*FACES, "nominal_area", "gas")
+        entries = {name: getattr(self, name) for name in names}
+        return entries | {"bodies": entries_of_bodies(self.bodies)}
+
+    def _with(self, numbers: Mapping[str, Any]) -> Joint:
+        """The joint of numbers in place of its inputs."""
+        entries = with_numbers(self._entries, numbers)
+        entries["bodies"] = bodies_of_entries(self.bodies, entries["bodies"])
+        return dataclasses.replace(self, **entries)
+
+    def _take_medians(self) -> None:
+        """What is of the joint of the inputs' medians, after a check of both ends of each."""
+        central = self._with(of_all(self.inputs, lambda each: each.median))
+        for end in ("low", "high"):
+            numbers = {
+                name: each.written(getattr(each, end))
+                for name, each in self.inputs.items()
+            }
+            typed = ", ".join(f"{name} = {number}" for name, number in numbers.items())
+            try:
+                self._with(numbers)
+            except OutOfRangeError as fault:
+                raise OutOfRangeError(
+                    f"{fault}; at the ends of the ranges: {typed}", fault.mask
+                ) from None
+        for name in ("surface", "interface", "_faces"):
+            object.__setattr__(self, name, getattr(central, name))
+        object.__setattr__(self, "_central", central)
+
+    @property
+    def central(self) -> Joint:
+        """The joint of the medians of all numbers that are not known; itself where all are."""
+        return self if self._central is None else self._central
+
+    def require_known(self, what: str) -> None:
+        """Reject numbers that are not known where something is of one joint."""
+        if self.inputs:
+            raise InputError(
+                f"{what} is of known numbers, and {', '.join(self.inputs)} are distributions: "
+                "uncertainty(pressure) has the quantiles, central is the joint of their "
+                "medians, replicas(n) are draws"
+            )
+
+    @property
+    def _description(self) -> Description:
+        """How contacts are made of drawn numbers."""
+        require_inputs(self.inputs, "the joint")
+
+        def make(numbers: Mapping[str, Any]) -> Pressed:
+            return self._with(numbers).at_pressure
+
+        return Description(self.inputs, make)
+
+    def uncertainty(
+        self,
+        pressure: ArrayLike | str,
+        *,
+        draws: int = DRAWS,
+        quantiles: ArrayLike = LEVELS,
+        quantities: Sequence[str] | None = None,
+        seed: int = 0,
+    ) -> Uncertainty:
+        """Quantiles of every quantity at pressures, and the share of each number that is not known.
+
+        The model's own error is drawn, too: one number for each draw, in standard
+        deviations, multiplies the stated scatter of every quantity at every pressure.
+
+        Parameters
+        ----------
+        pressure : array_like or str
+            F/A0, one or several, as for `at_pressure`.
+        draws, quantiles, quantities, seed
+            As for `mbma_tables.uncertainty`.
+
+        Returns
+        -------
+        Uncertainty
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            As `mbma_tables.uncertainty`.
+
+        Examples
+        --------
+        >>> from mbma_tables import Joint
+        >>> face = {"Ra": "0.8 um +- 0.1 um", "hurst": 0.8, "longest": "0.25..2.5 mm", "shortest": "8 um"}
+        >>> joint = Joint(face, bodies="steel 1020", nominal_area="4 cm^2", theory="calibrated")
+        >>> found = joint.uncertainty("10 MPa")
+        >>> shares = found.shares["solid_conductance"]
+        >>> shares["part_a.longest"] > shares["part_a.Ra"] > 0
+        array([ True])
+        """
+        return uncertainty_of(
+            self._description,
+            pressure,
+            draws=draws,
+            quantiles=quantiles,
+            quantities=quantities,
+            seed=seed,
+        )
+
+    def replicas(self, n: int, seed: int = 0) -> list[Replica]:
+        """Draws of all numbers that are not known and of the model's error, for a loop of one's own.
+
+        All quantities and loads of one replica belong together, as those of a member of a
+        set of LHAPDF do. They are the first draws of `uncertainty` with the same seed.
+
+        Examples
+        --------
+        >>> from mbma_tables import Joint
+        >>> face = {"Ra": "0.8 um +- 0.1 um", "hurst": 0.8, "longest": "0.25..2.5 mm", "shortest": "8 um"}
+        >>> joint = Joint(face, bodies="steel 1020", nominal_area="4 cm^2", theory="calibrated")
+        >>> drops = [1e4 / replica.at_pressure("10 MPa").solid_conductance for replica in joint.replicas(100)]
+        >>> len(drops), min(drops) < max(drops)
+        (100, np.True_)
+        """
+        return replicas_of(self._description, n, seed)
+
+    @property
     def pair(self) -> Pair | None:
         """The metals, where they are named."""
-        metals: Pair | None = self.bodies.metals
+        metals: Pair | None = self.central.bodies.metals
         return metals
 
     @functools.cached_property
@@ -246,6 +402,7 @@ class Joint(JointQuantities, Displayed):
 
     def require_one(self, what: str) -> None:
         """Reject a batch where something is of one joint."""
+        self.require_known(what)
         if self._is_labelled or self.shape != ():
             raise InputError(
                 f"{what} is of one joint, and this is a batch"
@@ -349,6 +506,8 @@ class Joint(JointQuantities, Displayed):
         >>> joint.pressure_of("40 kN"), f"{joint.at_pressure(joint.pressure_of('40 kN')).pressure:.2f} GPa"
         ('100000000 Pa', '0.10 GPa')
         """
+        if "nominal_area" in self.inputs:
+            self.require_known("the pressure of a force")
         if self.nominal_area is None:
             raise InputError("a force needs nominal_area, over which it is the pressure")
         return force_over_area(force, self.nominal_area, self.surface.unit)
@@ -379,6 +538,7 @@ class Joint(JointQuantities, Displayed):
         >>> f"{pressed.area:.2%}, {joint.at(area=pressed.area).mean_separation:.3f} um"
         '0.29%, 2.000 um'
         """
+        self.require_known("a contact")
         candidates = {
             "separation": separation,
             "mean_separation": mean_separation,
@@ -692,7 +852,12 @@ class Joint(JointQuantities, Displayed):
         return ratio_on(self.surface, self.bodies, self.direction, area)
 
     def table(self, pressures: ArrayLike | Sequence[str]) -> xr.Dataset:
-        """Every quantity of the joint at pressures, as an xarray Dataset with units and model uncertainties."""
+        """Every quantity of the joint at pressures, as an xarray Dataset with units and model uncertainties.
+
+        Where numbers are not known it has their quantiles, as of `uncertainty`.
+        """
+        if self.inputs:
+            return self.uncertainty(pressures).to_dataset()
         self.require_one("a table")
         pressed = self.at_pressure(np.atleast_1d(np.asarray(pressures)).tolist())
         variables = {}
@@ -725,9 +890,16 @@ class Joint(JointQuantities, Displayed):
         InputError
             For pressures that do not rise, and an unknown kind of file.
         """
-        self.require_one("a plot")
         if pressures is None:
             return super().plot(path)
+        between = self.central._pressures_between(pressures)
+        if self.inputs:
+            return self.uncertainty(between).plot(path)
+        self.require_one("a plot")
+        return saved(self._drawn(self.at_pressure(between)), path)
+
+    def _pressures_between(self, pressures: Any) -> FloatArray:
+        """Pressures of a plot between the smallest and the largest."""
         if not isinstance(pressures, tuple | list) or len(pressures) != 2:
             raise InputError(
                 f"pressures are the smallest and the largest, got {pressures!r}"
@@ -745,10 +917,10 @@ class Joint(JointQuantities, Displayed):
             raise InputError(
                 f"pressures are the smallest and the largest, got {pressures!r}"
             )
-        return saved(self._drawn(self.at_pressure(np.geomspace(low, high, POINTS))), path)
+        return np.geomspace(low, high, POINTS)
 
-    def _range(self) -> Contact:
-        """The contact at pressures from 1e-5 to 0.3 of the softer metal's hardness."""
+    def _range(self) -> FloatArray:
+        """Pressures from 1e-5 to 0.3 of the softer metal's hardness."""
         in_units = self._in_units
         largest = float(np.asarray(in_units.hardness))
         if np.isinf(largest):
@@ -758,10 +930,13 @@ class Joint(JointQuantities, Displayed):
                 largest = Units(stress=in_units.units.stress).number(
                     "pressure", f"{self.pair.softer.hardness[0]} GPa"
                 )
-        return self.at_pressure(np.geomspace(*RANGE, POINTS) * largest)
+        return np.geomspace(*RANGE, POINTS) * largest
 
     def facts(self) -> dict[str, str]:
         """The arguments of the joint, by name, and what its faces assume beyond them."""
+        if self.inputs:
+            typed = {name: each.text for name, each in self.inputs.items()}
+            return self.central.facts() | typed
         facts = {}
         hardness = self.bodies.hardness
         if self.pair is not None:
@@ -793,13 +968,17 @@ class Joint(JointQuantities, Displayed):
 
     _facts = facts
 
-    def _variables(self) -> dict[str, Variable]:
+    def _variables(self) -> Mapping[str, Variable]:
+        if self.inputs:
+            return self.uncertainty(self.central._range())._variables()
         self.require_one("a dataset")
-        return self.quantities(self._range())
+        return self.quantities(self.at_pressure(self._range()))
 
     def _figure(self) -> Figure:
+        if self.inputs:
+            return self.uncertainty(self.central._range())._figure()
         self.require_one("a plot")
-        return self._drawn(self._range())
+        return self._drawn(self.at_pressure(self._range()))
 
     def _drawn(self, pressed: Contact) -> Figure:
         unit = pressed.units["pressure"]

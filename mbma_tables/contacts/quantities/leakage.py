@@ -484,6 +484,7 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
     Dimension(length=3),
     "flow coefficient K: flow per length of seal is K dp/(12 viscosity width)",
     uncertainty="leakage_scatter",
+    error_sign=-1,
     is_column=False,
     is_listed=on_request,
 )

@@ -21,7 +21,7 @@ def _in_shape(contact: State, value: Any) -> Any:
     return 0.0 * contact.mean_separation + value if np.ndim(value) else value[()]
 
 
-@quantity(STRESS, "force over nominal area", uncertainty="scatter")
+@quantity(STRESS, "force over nominal area", uncertainty="scatter", error_sign=0)
 def pressure(contact: State) -> Any:
     """F/A0 in the unit of E*; F/(A0 E*) where that is 1."""
     return contact.answered("pressure")
@@ -34,7 +34,11 @@ def area(contact: State) -> Any:
 
 
 @quantity(
-    STRESS, "mean pressure in the contact", uncertainty="area_scatter", is_column=False
+    STRESS,
+    "mean pressure in the contact",
+    uncertainty="area_scatter",
+    error_sign=-1,
+    is_column=False,
 )
 def mean_pressure(contact: State) -> Any:
     """Mean pressure in the contact, F/A [stress]; NaN where there is none."""

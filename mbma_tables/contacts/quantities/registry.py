@@ -74,6 +74,9 @@ class Quantity:
     made_of: tuple[str, ...] = ()
     #: name of the quantity that holds its model uncertainty, None where it has none of its own
     uncertainty: str | None = None
+    #: sign of the model's error at a pressure where that of the area is positive; 0 where its
+    #: uncertainty is not one at a pressure
+    error_sign: int = 1
     is_column: bool = True  # whether tables in a terminal have it
     # whether datasets and tables have it without being asked: not where it takes a further
     # simulation, nor of contacts of which it says nothing new

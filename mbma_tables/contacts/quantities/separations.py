@@ -9,7 +9,9 @@ from mbma_tables.contacts.quantities.state import State
 LENGTH = Dimension(length=1)
 
 
-@quantity(LENGTH, "mean gap u = (h_max + d)/2", uncertainty="separation_scatter")
+@quantity(
+    LENGTH, "mean gap u = (h_max + d)/2", uncertainty="separation_scatter", error_sign=-1
+)
 def mean_separation(contact: State) -> Any:
     """Mean separation u = (h_max + d)/2 (50) [length]: the mean gap, with yielded points flattened."""
     return contact.answered("mean_separation")

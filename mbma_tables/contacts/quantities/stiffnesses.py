@@ -65,6 +65,7 @@ def tangential_stiffness(contact: State) -> Any:
     ENERGY,
     "elastic energy per nominal area",
     uncertainty="scatter",
+    error_sign=0,
     needs=(NO_HARDNESS,),
     is_column=False,
 )
