@@ -1,4 +1,9 @@
-"""Circles of imports among a package's modules, those inside functions and under TYPE_CHECKING counted.
+"""Circles of imports among a package's modules, however they are written.
+
+Imports inside functions and under TYPE_CHECKING count, and so do the modules that a file
+with a call of `import_module` or `__import__` names in strings, whether in the call itself
+or in a table that the call reads. Registries alone may name the files that declare into
+them, of which they use nothing else.
 
 `python benchmarks/import_circles.py [package]` prints one line a circle, and ends with 1
 where there is one.
@@ -8,17 +13,42 @@ import ast
 import pathlib
 import sys
 
+CALLS = ("import_module", "__import__")
+REGISTRIES = (
+    "mbma_tables.contacts.quantities.registry",
+    "mbma_tables.export.targets",
+    "generate.page",
+)
+
 
 def imports_of(name: str, path: pathlib.Path, known: set[str]) -> set[str]:
     """Modules among the known ones that a file imports anywhere, but for the packages that it lies in."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    package = name if path.name == "__init__.py" else name.rpartition(".")[0]
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    strings = set()
+    imports_by_name = False
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             inner = {f"{node.module}.{alias.name}" for alias in node.names}
             found |= inner & known or {node.module}
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            # absolute, or relative to the package
+            strings |= {node.value, f"{package}.{node.value.lstrip('.')}"}
+        elif isinstance(node, ast.Call):
+            imports_by_name |= name_of(node.func) in CALLS
+    if imports_by_name and name not in REGISTRIES:
+        found |= strings
     return {other for other in found & known if other != name}
+
+
+def name_of(called: ast.expr) -> str:
+    """The name of a function, without that of its module."""
+    if isinstance(called, ast.Attribute):
+        return called.attr
+    return called.id if isinstance(called, ast.Name) else ""
 
 
 def import_graph(

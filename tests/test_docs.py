@@ -175,9 +175,11 @@ def test_every_module_of_the_architecture_exists():
     text = PAGES["architecture.md"]
     named = set(re.findall(r"\b[a-z]+(?:/[a-z_0-9]+)+\.py", text))
     assert len(named) > 15
-    assert [
-        name for name in sorted(named) if not (ROOT / "mbma_tables" / name).exists()
-    ] == []
+    homes = (ROOT / "mbma_tables", ROOT)
+    missing = [
+        name for name in named if not any((home / name).exists() for home in homes)
+    ]
+    assert missing == []
     path = re.findall(r"^\d\. `(\S+)`", text, re.MULTILINE)
     lines = [
         len((ROOT / "mbma_tables" / name).read_text(encoding="utf-8").splitlines())

@@ -33,6 +33,7 @@ from mbma_tables.theories.base import (
     UserTheory,
     require_domain,
 )
+from mbma_tables.theories.hardness import with_hardness
 
 # what a theory gives at once; the other quantities follow
 ANSWERED = ("separation", "mean_separation", "pressure", "area", "error")
@@ -175,7 +176,7 @@ def _solved(
     modulus = spread(modulus, shape)
     theory = setup.theory
     if setup.bodies.yields:
-        theory = theory.with_hardness(cap, modulus)
+        theory = with_hardness(theory, cap, modulus)
     gaps, lighter = _separations(setup, theory, surface, question, modulus, cap)
     d = np.asarray(gaps["separation"])
     u = np.asarray(gaps["mean_separation"])

@@ -44,6 +44,7 @@ from mbma_tables.contacts.question import GAPS, both_separations
 from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
 from mbma_tables.surfaces.surface import assumptions
 from mbma_tables.theories.base import Theory, TheoryAnswer
+from mbma_tables.theories.hardness import with_hardness
 
 if TYPE_CHECKING:
     from mbma_tables.contacts.quantities.leakage import Leakage
@@ -80,7 +81,8 @@ class Setup:
         if not self.bodies.yields:
             return self.theory
         broadcast_shape(E_star=bodies.E_star, hardness=bodies.hardness)
-        return self.theory.with_hardness(checked_hardness(bodies.hardness), bodies.E_star)
+        hardness = checked_hardness(bodies.hardness)
+        return with_hardness(self.theory, hardness, bodies.E_star)
 
 
 class Contact(State, Displayed):

@@ -8,13 +8,12 @@ from __future__ import annotations
 import abc
 import dataclasses
 import functools
-import importlib
 import reprlib
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import (
     FloatArray,
@@ -126,6 +125,8 @@ class Theory(abc.ABC):
     bends_in_area = False  # whether at its `bends` only the area is not smooth
     # whether force vanishes at u = h_max; else its Gaussian heights are unbounded
     ends_at_h_max = True
+    # whether it simulates a map, and can do so anew with a hardness
+    presses_anew = False
 
     def __init_subclass__(cls, **options: Any) -> None:
         """Check what the `answer` of a user's subclass returns, which all else unpacks."""
@@ -206,40 +207,6 @@ class Theory(abc.ABC):
     def elastic(self) -> Theory:
         """The theory of the elastic contact, if this one includes yielding."""
         return self
-
-    def with_hardness(self, hardness: ArrayLike, E_star: ArrayLike = 1.0) -> Theory:
-        """The theory of bodies whose pressure cannot exceed a hardness.
-
-        Parameters
-        ----------
-        hardness : array_like
-            Largest pressure p_m that the softer body supports, positive, in the unit of
-            `E_star`; where it is infinite, nothing yields.
-        E_star : array_like
-            Effective modulus; if it is 1, the hardness is over E*.
-
-        Returns
-        -------
-        Theory
-            A `Yielding` of this theory, or what a subclass makes that knows more of its contacts.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from mbma_tables import Surface
-        >>> from mbma_tables.theories import resolve
-        >>> surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
-        >>> metal = resolve("calibrated").with_hardness(1500.0, E_star=100e3)
-        >>> f"{metal.area_at(surface, np.array(3e-4)):.4f}"
-        '0.0210'
-        """
-        # it needs scipy, which takes long to import, and it imports this module
-        yielding = importlib.import_module("mbma_tables.theories.yielding.theory")
-        # beyond the largest number nothing yields
-        with np.errstate(over="ignore"):
-            hardness_over_E_star = np.asarray(hardness, dtype=float) / E_star
-            wrapped: Theory = yielding.Yielding(self, hardness_over_E_star)
-        return wrapped
 
     def at(self, shape: tuple[int, ...], place: Indices) -> Theory:
         """The theory at flat indices of a broadcast shape, if it contains arrays."""

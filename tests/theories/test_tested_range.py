@@ -8,6 +8,7 @@ from helpers import contact_of
 from generate.boundary_elements.evidence import evidence
 from mbma_tables import Bodies, InputError, Joint, Surface, contact, contact_law
 from mbma_tables.theories import THEORIES, Calibrated
+from mbma_tables.theories.hardness import with_hardness
 
 each = pytest.mark.parametrize("theory", THEORIES)
 
@@ -225,7 +226,7 @@ def test_a_smooth_second_face_does_not_widen_what_was_tested():
 def test_a_theory_with_a_hardness_is_no_theory_of_an_elastic_contact():
     """Beside `Bodies` it was applied twice, and without them its unloading stiffness was that of loading."""
     face = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5)
-    theory = Calibrated().with_hardness(0.01, 1.0)
+    theory = with_hardness(Calibrated(), 0.01, 1.0)
     for bodies in (1.0, Bodies(hardness=0.01)):
         with pytest.raises(InputError, match="a hardness is of the bodies"):
             contact(face, bodies, pressure=1e-3, theory=theory)

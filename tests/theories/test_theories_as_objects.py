@@ -6,7 +6,14 @@ import pickle
 import numpy as np
 import pytest
 
-from mbma_tables import InputError, OutOfRangeError, Surface, contact, contact_law
+from mbma_tables import (
+    Bodies,
+    InputError,
+    OutOfRangeError,
+    Surface,
+    contact,
+    contact_law,
+)
 from mbma_tables.theories import (
     Calibrated,
     GreenwoodWilliamson,
@@ -17,6 +24,7 @@ from mbma_tables.theories import (
     Variant,
     resolve,
 )
+from mbma_tables.theories.hardness import with_hardness
 
 FACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
 EACH = [Mbma, Calibrated, Persson, GreenwoodWilliamson]
@@ -89,6 +97,35 @@ def test_a_users_object_has_what_a_shipped_theory_has(again):
         for beyond in (0.4, 21.0):
             with pytest.raises(OutOfRangeError):
                 ask(beyond)
+
+
+class Borrowed:
+    """A user's object that answers what a shipped theory does."""
+
+    name = "borrowed"
+
+    def __init__(self, theory):
+        self.theory = theory
+        self.ends_at_h_max = theory.ends_at_h_max
+        self.interval = theory.interval
+
+    def answer(self, surface, mean_separation):
+        answer = self.theory.answer(surface, mean_separation)
+        return answer.pressure, answer.area
+
+
+def test_a_users_object_can_have_a_hardness():
+    shipped = resolve("persson")
+    metal = Bodies(100.0, hardness=3.0)
+    pressures = [0.01, 0.1, 0.5]
+    known = contact(FACE, metal, pressure=pressures, theory=shipped)
+    found = contact(FACE, metal, pressure=pressures, theory=Borrowed(shipped))
+    assert (known.yielded > 0.5).all()
+    assert found.area == pytest.approx(known.area, rel=1e-7)
+    assert found.yielded == pytest.approx(known.yielded, rel=1e-6)
+    wrapped = with_hardness(resolve(Borrowed(shipped)), 0.03)
+    u = known.mean_separation
+    assert 100.0 * wrapped.answer(FACE, u).pressure == pytest.approx(pressures, rel=1e-7)
 
 
 class Pair(Theory):

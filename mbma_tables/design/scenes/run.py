@@ -29,6 +29,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories import resolve
+from mbma_tables.theories.hardness import with_hardness
 from mbma_tables.theories.mbma.models import get_model
 
 if TYPE_CHECKING:
@@ -309,7 +310,7 @@ def other_theory(
     chosen = resolve(theory, surface)
     u = (float(surface.h_max) + gap) / 2
     if hardness < math.inf:
-        chosen = chosen.with_hardness(hardness, E_star)
+        chosen = with_hardness(chosen, hardness, E_star)
     answer = answer_where_finite(chosen, surface, u)
     of_pressure, of_area = answer._fields[:2]
     return Curve(

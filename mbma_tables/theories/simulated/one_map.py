@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-import importlib
 import os
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from mbma_tables.common.arguments import FloatArray, require
@@ -98,6 +97,8 @@ class BoundaryElements(Theory):
         grid: Grid = FULL,
     ) -> None:
         self.grid = grid
+        # a table without its map is not pressed anew
+        self.presses_anew = isinstance(pressed, Press) and grid.simulates_all
         self.surface, self.rows, self.points, self.pressed, self.origin = (
             surface,
             rows,
@@ -184,15 +185,6 @@ class BoundaryElements(Theory):
     def from_netcdf(cls, path: os.PathLike[str] | str) -> BoundaryElements:
         """Open such a table (`TableFileError` if damaged or edited); for its `.surface` "simulated" is the default."""
         return cls.of(own_map.read_surface(path))
-
-    def with_hardness(self, hardness: ArrayLike, E_star: ArrayLike = 1.0) -> Theory:
-        """The map simulated anew with the hardness; a table without its map by the law of hardness."""
-        yielding: Any = super().with_hardness(hardness, E_star)
-        if not isinstance(self.pressed, Press) or not self.grid.simulates_all:
-            return yielding  # type: ignore[no-any-return]
-        # it imports this module
-        saturated = importlib.import_module("mbma_tables.theories.simulated.yielded")
-        return saturated.Saturated(self, yielding.hardness)  # type: ignore[no-any-return]
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """What is doubtful about the measurement; the theory is of this map, whatever its statistics."""

@@ -1,0 +1,51 @@
+"""A theory of elastic contact made one of bodies with a hardness."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mbma_tables.theories.base import Theory
+
+
+def with_hardness(theory: Theory, hardness: ArrayLike, E_star: ArrayLike = 1.0) -> Theory:
+    """The theory of bodies whose pressure cannot exceed a hardness.
+
+    Parameters
+    ----------
+    theory : Theory
+        The elastic one; a user's object becomes one by `resolve`.
+    hardness : array_like
+        Largest pressure p_m that the softer body supports, positive, in the unit of
+        `E_star`; where it is infinite, nothing yields.
+    E_star : array_like
+        Effective modulus; if it is 1, the hardness is over E*.
+
+    Returns
+    -------
+    Theory
+        The simulation of a map is made anew with the hardness; any other theory is corrected
+        by `mbma_tables.theories.yielding`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mbma_tables import Surface
+    >>> from mbma_tables.theories import resolve
+    >>> from mbma_tables.theories.hardness import with_hardness
+    >>> surface = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
+    >>> metal = with_hardness(resolve("calibrated"), 1500.0, E_star=100e3)
+    >>> f"{metal.area_at(surface, np.array(3e-4)):.4f}"
+    '0.0210'
+    """
+    # beyond the largest number nothing yields
+    with np.errstate(over="ignore"):
+        hardness_over_E_star = np.asarray(hardness, dtype=float) / E_star
+    # both modules import scipy, which takes long and which elastic contacts do without
+    if theory.presses_anew:
+        from mbma_tables.theories.simulated.yielded import Saturated
+
+        return Saturated(theory, hardness_over_E_star)
+    from mbma_tables.theories.yielding.theory import Yielding
+
+    return Yielding(theory, hardness_over_E_star)

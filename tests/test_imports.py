@@ -1,0 +1,44 @@
+"""The check of circles, `benchmarks/import_circles.py`: nothing imports what is above it."""
+
+import pathlib
+
+import pytest
+
+from benchmarks import import_circles
+
+ROOT = pathlib.Path(__file__).parents[1]
+# a module that imports the one above it
+HIDDEN = {
+    "in a function": "def ask():\n    from planted import above\n    return above",
+    "for types": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import planted.above",
+    "by a string": "import importlib\ndef ask():\n    return importlib.import_module('planted.above')",
+    "by a relative string": "from importlib import import_module\nMADE = import_module('.above', __package__)",
+    "by a built-in function": "def ask():\n    return __import__('planted.above')",
+    "by a table of strings": "import importlib\nHOMES = {'Above': 'above'}\n"
+    "def ask(name):\n    return importlib.import_module(f'planted.{HOMES[name]}')",
+}
+
+
+@pytest.mark.parametrize("package", ["mbma_tables", "generate"])
+def test_no_module_reaches_itself(package):
+    assert import_circles.circles(ROOT / package) == []
+
+
+@pytest.mark.parametrize("how", HIDDEN)
+def test_a_hidden_circle_is_found(tmp_path, how):
+    package = tmp_path / "planted"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "above.py").write_text("from planted import below\n")
+    (package / "below.py").write_text("")
+    assert import_circles.circles(package) == []
+    (package / "below.py").write_text(HIDDEN[how])
+    assert import_circles.circles(package) == [["planted.above", "planted.below"]]
+
+
+@pytest.mark.parametrize("registry", import_circles.REGISTRIES)
+def test_an_exception_is_one_of_a_registry_that_needs_it(monkeypatch, registry):
+    others = [name for name in import_circles.REGISTRIES if name != registry]
+    monkeypatch.setattr(import_circles, "REGISTRIES", others)
+    circles = import_circles.circles(ROOT / registry.partition(".")[0])
+    assert registry in [name for circle in circles for name in circle]
