@@ -338,7 +338,7 @@ file_options = option_group(
         "--quantity",
         metavar="NAME[,NAME]",
         callback=_names,
-        help="Of the rows, any that contacts have, else the usual one; several for lsdyna, getdp, moose-function.",
+        help="Of the rows, any that contacts have, else the usual one; several for some programs.",
     ),
     click.option("--rows", type=int, help="Number of rows; else as few as --rtol needs."),
     click.option(

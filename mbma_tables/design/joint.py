@@ -742,8 +742,8 @@ class Joint(JointQuantities, Displayed):
             gives them.
         quantity : str or sequence of str, optional
             Of the rows, as for `describe_law`: data, and programs that interpolate any
-            table, take every quantity of a contact. Several for targets "lsdyna", "getdp"
-            and "moose-function". Default: "total_conductance", in a vacuum
+            table, take every quantity of a contact. Several where the program takes
+            them, as docs/export.md lists. Default: "total_conductance", in a vacuum
             "solid_conductance", with the pressure in solvers that have both; without `heat`
             pressure.
         rows, rtol : int and float, optional

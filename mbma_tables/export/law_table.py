@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import bisect
 import dataclasses
+import re
 from collections.abc import Mapping
 from decimal import ROUND_CEILING, Context
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -62,6 +63,12 @@ class LawTable(Displayed):
         return "film" if self.x_name == "mean_separation" else self.y_name
 
     @property
+    def title(self) -> str:
+        """Columns with their units against the first one."""
+        first, *others = (f"{name} [{unit}]" for name, (_, unit) in self.columns.items())
+        return f"{', '.join(others)} against {first}"
+
+    @property
     def columns(self) -> dict[str, tuple[FloatArray, str]]:
         """All columns by their names, with their units."""
         return {
@@ -93,6 +100,28 @@ class LawTable(Displayed):
             for name, unit in ((self.x_name, self.x_unit), (self.y_name, self.y_unit))
         )
         return draw_line(self.x[1:], self.y[1:], *labels)
+
+
+class Curve(NamedTuple):
+    """A column that a program finds in a file of rows, against the first one."""
+
+    name: str
+    x: FloatArray
+    y: FloatArray
+    # largest relative difference from the law's rows that the file states or that its
+    # fields allow
+    rtol: float = 0.0
+
+
+def titled(text: str) -> list[str]:
+    """Names of the columns after the first, by the line of a header that has them.
+
+    That line is like "area [1], stiffness [MPa/mm] against pressure [MPa]".
+    """
+    found = re.search(r"^\W*(\w+ \[.*\]) against \w+ \[", text, re.M)
+    if found is None:
+        raise InputError("the header has no line of the columns' names")
+    return re.findall(r"(\w+) \[.*?\](?:, |$)", found[1])
 
 
 def chosen_rows(

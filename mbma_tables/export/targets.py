@@ -13,7 +13,7 @@ from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
 from mbma_tables.contacts.quantities.registry import registry
-from mbma_tables.export.law_table import LawTable
+from mbma_tables.export.law_table import Curve, LawTable
 from mbma_tables.export.text import checked_name, comment
 
 LAW = frozenset(
@@ -82,6 +82,12 @@ class Target:
     several: bool = False
     alone: bool = True  # whether the first file can be used without those beside it
     beside: tuple[str, ...] = ()  # ends of the names of other files
+    # for the documentation: what the file has, and how that was tested
+    output: str = ""
+    tested: str = ""
+    longest_name: int | None = None  # letters of a name, where one stands in the file
+    # curves that the first file of rows has
+    read: Callable[[bytes], list[Curve]] | None = None
 
     def place_of_name(
         self, name: str | None, out: pathlib.Path | None
@@ -124,27 +130,35 @@ class Target:
         }
 
 
-@dataclasses.dataclass(frozen=True)
-class Grammar:
-    """Format of the rows of a law for a program; called with a `LawTable` it returns the text of a file."""
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RowFormat:
+    """Declaration of the rows of a program; called with a `LawTable` it returns a text.
 
+    It stands beside the functions that write and read the text. The command, `Joint.export`,
+    the tests and the table of docs/export.md take every one that a file of `rows/solvers`
+    declares.
+    """
+
+    name: str  # of the target
     program: str
+    output: str  # what the file has, for the documentation
+    tested: str  # how the program was seen to read it
     mark: str  # of comments
-    beyond: (
-        str  # behaviour of the program outside the rows, and further notes for its user
-    )
+    # behaviour of the program outside the rows, and further notes for its user
+    beyond: str
+    # curves as the program takes them from a text, which the tests compare with the rows
+    read: Callable[[str], list[Curve]]
     # by quantity: text below the comments, from the law and the names
     body: Mapping[str, Callable[..., str]] = dataclasses.field(default_factory=dict)
     # the same text of any quantity, where the program takes all of them
     of_any: Callable[..., str] | None = None
-    most: Mapping[str, int] = dataclasses.field(
-        default_factory=dict
-    )  # rows that it holds, by quantity
+    # rows that it holds, by quantity
+    most: Mapping[str, int] = dataclasses.field(default_factory=dict)
     named: str | None = None  # default name; None if there is none
+    longest_name: int = MAX_NAME  # letters
     first: str = ""  # line of the file
-    units: tuple[str, str] | None = (
-        None  # of length and of stress, if they are prescribed
-    )
+    # of length and of stress, if they are prescribed
+    units: tuple[str, str] | None = None
     friction: str = ""  # notes for the user of its friction card; empty without one
     # whether rows of conductance stand beside those of the pressure of the same joint
     closure: bool = False
@@ -164,7 +178,11 @@ class Grammar:
         named = (
             {}
             if self.named is None
-            else {"name": checked_name(self.named if name is None else name, MAX_NAME)}
+            else {
+                "name": checked_name(
+                    self.named if name is None else name, self.longest_name
+                )
+            }
         )
         for one in laws:
             self._check(one)
@@ -204,8 +222,8 @@ class Grammar:
             if not allowed:
                 raise InputError(f"{self.program} takes {takes} here, got {got}")
 
-    def target(self, name: str) -> Target:
-        """The target of this name."""
+    def target(self) -> Target:
+        """The same as a target."""
         quantities = self.body if self.of_any is None else OPTIONS
         of_any: set[str] = set()
         own: set[str] = set()
@@ -219,7 +237,7 @@ class Grammar:
             | (FRICTION if self.friction else set())
         )
         return Target(
-            name,
+            self.name,
             self,
             takes,
             quantity=next(iter(self.body), "pressure"),
@@ -227,6 +245,10 @@ class Grammar:
             most=self.most,
             quantities=tuple(self.body or AGAINST),
             several=self.several is not None,
+            output=self.output,
+            tested=self.tested,
+            longest_name=self.longest_name if self.named else None,
+            read=lambda content: self.read(content.decode()),
         )
 
 

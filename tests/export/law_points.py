@@ -11,16 +11,11 @@ from helpers import law_of_names
 
 from mbma_tables import ContactLaw, Surface
 from mbma_tables.export.code.law_code import law_text
+from mbma_tables.export.rows.solvers import FORMATS
+from mbma_tables.export.targets import targets
 
-PLAIN = (
-    "calculix",
-    "abaqus",
-    "lsdyna",
-    "optistruct",
-    "comsol",
-    "moose",
-    "modelica",
-)  # of rows of pressure alone
+# formats of rows of pressure
+PLAIN = [name for name in FORMATS if "pressure" in targets()[name].quantities]
 POINTS = 10_000
 # what agreement is asked of exported laws
 VALUES = 1e-13

@@ -13,7 +13,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from law_points import PLAIN, needs
+from law_points import needs
 
 import mbma_tables.core
 from mbma_tables import InputError, Surface, __version__
@@ -25,7 +25,7 @@ from mbma_tables.export.model.c_code import (
     read_report,
     write_code,
 )
-from mbma_tables.export.rows import data, solvers
+from mbma_tables.export.rows import data
 from mbma_tables.export.rows.law_rows import describe_law
 from mbma_tables.export.text import checked_name
 from mbma_tables.islands.variants import Variant, get_variant
@@ -392,17 +392,17 @@ def test_source_code():
     assert live(hostile) == live(plain)
 
 
-@pytest.mark.parametrize("target", [*PLAIN, "matlab"])
-def test_decks_and_functions(target, law):
-    write = getattr(solvers, target, lambda law: data.matlab_reader(law, "law").decode())
-    mark = getattr(write, "mark", "%")
+def test_a_function_of_matlab_has_no_text_of_a_user_as_code(law):
+    def write(one):
+        return data.matlab_reader(one, "law").decode()
+
     words = {
         "comments": (HOSTILE, HOSTILE, *law.comments[2:], HOSTILE),
         "x_unit": HOSTILE,
         "y_unit": HOSTILE,
     }
     live = [
-        [line for line in write(one).splitlines() if not line.startswith(mark)]
+        [line for line in write(one).splitlines() if not line.startswith("%")]
         for one in (law, dataclasses.replace(law, **words))
     ]
     assert live[0] == live[1]
@@ -413,9 +413,8 @@ def test_decks_and_functions(target, law):
     ["A\n*INCLUDE, INPUT=evil", "A, B", "", "1", "x'); system('evil", "é", "A" * 81, 3],
 )
 def test_names_of_cards_and_functions(name, law):
-    for write in (solvers.calculix, solvers.abaqus, solvers.modelica, data.matlab_reader):
-        with pytest.raises(InputError, match="a name must be a letter"):
-            write(law, name)
+    with pytest.raises(InputError, match="a name must be a letter"):
+        data.matlab_reader(law, name)
     assert checked_name("Rough_2", 7) == "Rough_2"
 
 

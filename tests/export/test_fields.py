@@ -358,21 +358,6 @@ def test_data_of_a_film_come_back(name, tmp_path):
         np.testing.assert_array_equal(found[key], values, err_msg=key)
 
 
-@pytest.mark.parametrize("name", ["comsol", "moose", "modelica"])
-def test_columns_of_a_film(name):
-    film = rows_of(**FILM)
-    lines = [
-        line.split()
-        for line in getattr(solvers, name)(film).splitlines()
-        if line[0] in "0123456789"
-    ]
-    np.testing.assert_allclose(
-        np.array(lines, float).T,
-        [values for values, _ in film.columns.values()],
-        rtol=1e-9,
-    )
-
-
 def written(*words):
     ran = CliRunner().invoke(
         main,

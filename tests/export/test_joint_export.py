@@ -413,7 +413,7 @@ SEVERAL = ("pressure", "total_conductance", "tangential_stiffness")
 def test_several_quantities_in_one_file(joint):
     curves = joint.export("lsdyna", SPAN, quantity=SEVERAL)
     assert re.findall(r"^\*DEFINE_CURVE\n +(\d)", curves, re.M) == ["1", "2", "3"]
-    assert "$ curve 3: tangential_stiffness against pressure" in curves
+    assert "$ curve 3: tangential_stiffness [MPa/mm] against pressure [MPa]" in curves
     blocks = joint.export("moose-function", SPAN, name="bolt", quantity=SEVERAL)
     assert blocks.count("[Functions]") == 1
     assert re.findall(r"\[(bolt_\w+)\]", blocks) == [f"bolt_{name}" for name in SEVERAL]

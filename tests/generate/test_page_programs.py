@@ -11,7 +11,7 @@ from generate import height_coefficients
 from generate.__main__ import COMMANDS, main
 from generate.files import ROOT
 from generate.page import MARKED, fill, svg
-from generate.pages import library, maps, stability
+from generate.pages import export, library, maps, stability
 from mbma_tables import InputError, Surface, contact, theories
 
 SVG = b"<?xml"
@@ -170,3 +170,9 @@ def test_what_goes_wrong_is_counted():
         [0.0, 0.5, math.nan, math.nan, math.nan], nan_ok=True
     )
     assert stability.row("some", found) == ["some", 5, 1, 2, 0, 0.5, 1]
+
+
+def test_the_table_of_formats_is_that_of_their_declarations():
+    text = (ROOT / "docs/export.md").read_text(encoding="utf-8")
+    parts, _ = export.formats()
+    assert fill(text, parts) == text

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray, needed
 from mbma_tables.common.files import written_bytes
 from mbma_tables.export.code.reserved_words import matlab_words
-from mbma_tables.export.law_table import LawTable
+from mbma_tables.export.law_table import Curve, LawTable
 from mbma_tables.export.targets import AGAINST, Target
 from mbma_tables.export.text import checked_name, comment, csv_cell, number
 
@@ -148,20 +149,93 @@ def _matlab_files(law: LawTable, name: str) -> dict[str, bytes]:
     return {"": to_matlab(law), ".m": matlab_reader(law, name)}
 
 
-_WRITE = {
-    "csv": to_csv,
-    "json": to_json,
-    "netcdf": to_netcdf,
-    "hdf5": to_netcdf,
-    "parquet": to_parquet,
-}
+def _curves(columns: Mapping[str, Any]) -> list[Curve]:
+    """Columns against the first one."""
+    arrays = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
+    x, *names = arrays
+    return [Curve(name, arrays[x], arrays[name]) for name in names]
+
+
+def read_csv(content: bytes) -> list[Curve]:
+    """Columns below the comments."""
+    text = content.decode()
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    head, *rows = csv.reader(lines)
+    names = [cell.partition(" [")[0] for cell in head]
+    return _curves(dict(zip(names, np.array(rows, dtype=float).T, strict=True)))
+
+
+def read_json(content: bytes) -> list[Curve]:
+    """Columns of the object."""
+    return _curves(json.loads(content)["columns"])
+
+
+def read_matlab(content: bytes) -> list[Curve]:
+    """The vectors x and y by their names, and the other columns."""
+    from scipy.io import loadmat
+
+    held = loadmat(io.BytesIO(content))
+    rows = held["x"].size
+    columns = {}
+    for name in ("x", "y"):
+        columns[held[f"{name}_name"].item()] = held.pop(name)[:, 0]
+    for name, values in held.items():
+        if isinstance(values, np.ndarray) and values.shape == (rows, 1):
+            columns[name] = values[:, 0]
+    return _curves(columns)
+
+
+def read_netcdf(content: bytes) -> list[Curve]:
+    """Variables of the file."""
+    import netCDF4
+
+    with netCDF4.Dataset("law.nc", memory=content) as held:
+        columns = {name: np.array(values[:]) for name, values in held.variables.items()}
+    return _curves(columns)
+
+
+def read_parquet(content: bytes) -> list[Curve]:
+    """Columns of the table."""
+    table = needed("pyarrow.parquet").read_table(io.BytesIO(content))
+    return _curves({name: table[name].to_numpy() for name in table.column_names})
+
+
+def _target(
+    name: str,
+    write: Callable[..., Any],
+    read: Callable[[bytes], list[Curve]],
+    tested: str,
+    output: str = "rows with units and the header",
+    **other: Any,
+) -> Target:
+    """A format of data, which takes any quantity."""
+    return Target(
+        name,
+        write,
+        quantities=tuple(AGAINST),
+        output=output,
+        tested=tested,
+        read=read,
+        **other,
+    )
+
+
 TARGETS = (
-    *(Target(name, write, quantities=tuple(AGAINST)) for name, write in _WRITE.items()),
-    Target(
+    _target("csv", to_csv, read_csv, "R 4.2"),
+    _target("json", to_json, read_json, "Python's `json`"),
+    _target("netcdf", to_netcdf, read_netcdf, "R 4.2, netCDF4 of Python"),
+    _target(
+        "hdf5", to_netcdf, read_netcdf, "h5py", "the netCDF file, which is one of HDF5"
+    ),
+    _target("parquet", to_parquet, read_parquet, "pyarrow"),
+    _target(
         "matlab",
         _matlab_files,
+        read_matlab,
+        "Octave 7.3, to 1e-12",
+        "a `.mat` file of version 5 and a function that interpolates in it",
         end=".mat",
-        quantities=tuple(AGAINST),
+        longest_name=MAX_MATLAB_NAME,
         beside=(".m",),
     ),
 )

@@ -392,8 +392,10 @@ def _table(
     of_others: list[str] = []
     if quantity == "hydraulic_aperture":
         more, of_others = _of_aperture(exported, x, fine_x, fine_y, floor)
+    columns = {y_name: (y, y_unit), **more}
+    named = ", ".join(f"{name} [{unit}]" for name, (_, unit) in columns.items())
     comments = exported.header(
-        f"{y_name} [{y_unit}] against {x_name} [{x_unit}]",
+        f"{named} against {x_name} [{x_unit}]",
         f"{x_name} from 0 to {number(x[-1])} {x_unit}, {why}",
         _of_rows(y_name, x.size, error, f"{y_name} {about(floor)} {y_unit}"),
         *of_others,

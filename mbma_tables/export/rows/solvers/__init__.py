@@ -1,35 +1,28 @@
-"""Contact laws in the formats of other programs: a file a program, each with a `Grammar` of rows.
+"""Contact laws in the formats of other programs: a file a program, each with a `RowFormat`.
 
-CalculiX 2.20 and GetDP 3.2 were run. The others follow manuals and sources, which their
-files name.
+All files are loaded; there is no list of them. CalculiX 2.20 and GetDP 3.2 were run. The
+others follow manuals and sources, which their files name. A format is called by its name
+here, too, as in `solvers.abaqus(law, name="ROAD")`.
 """
 
-from mbma_tables.export.rows.solvers.abaqus import abaqus as abaqus
-from mbma_tables.export.rows.solvers.calculix import calculix as calculix
-from mbma_tables.export.rows.solvers.comsol import comsol as comsol
-from mbma_tables.export.rows.solvers.geos import geos as geos
-from mbma_tables.export.rows.solvers.getdp import getdp as getdp
-from mbma_tables.export.rows.solvers.lethe import lethe as lethe
-from mbma_tables.export.rows.solvers.lsdyna import lsdyna as lsdyna
-from mbma_tables.export.rows.solvers.mbdyn import mbdyn as mbdyn
-from mbma_tables.export.rows.solvers.modelica import modelica as modelica
-from mbma_tables.export.rows.solvers.moose import moose as moose
-from mbma_tables.export.rows.solvers.moose import moose_function as moose_function
-from mbma_tables.export.rows.solvers.optistruct import optistruct as optistruct
+import importlib
+import pkgutil
 
-# by the names of their targets, in the order in which help lists them
-SOLVERS = {
-    "calculix": calculix,
-    "abaqus": abaqus,
-    "lsdyna": lsdyna,
-    "optistruct": optistruct,
-    "comsol": comsol,
-    "moose": moose,
-    "modelica": modelica,
-    "mbdyn": mbdyn,
-    "geos": geos,
-    "moose-function": moose_function,
-    "getdp": getdp,
-    "lethe": lethe,
-}
-TARGETS = tuple(grammar.target(name) for name, grammar in SOLVERS.items())
+from mbma_tables.export.targets import RowFormat
+
+
+def _all_formats() -> dict[str, RowFormat]:
+    """Formats of all files by the names of their targets."""
+    formats: dict[str, RowFormat] = {}
+    for file in pkgutil.iter_modules(__path__):
+        module = importlib.import_module(f"{__name__}.{file.name}")
+        for value in vars(module).values():
+            if isinstance(value, RowFormat):
+                formats[value.name] = value
+    return formats
+
+
+FORMATS = _all_formats()
+TARGETS = tuple(row_format.target() for row_format in FORMATS.values())
+for _name, _format in FORMATS.items():
+    globals()[_name.replace("-", "_")] = _format

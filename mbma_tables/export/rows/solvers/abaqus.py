@@ -1,13 +1,18 @@
 """Contact laws as cards of Abaqus; of its manual. CalculiX reads the same syntax."""
 
+import re
 from collections.abc import Iterable
 
-from mbma_tables.export.law_table import LawTable
-from mbma_tables.export.targets import CONDUCTANCES, Grammar
+import numpy as np
+
+from mbma_tables.export.law_table import Curve, LawTable
+from mbma_tables.export.targets import CONDUCTANCES, RowFormat
 from mbma_tables.export.text import number
 
 # columns of a number: CalculiX reads no more of it, so that a longer one may lose its exponent
 CARD_WIDTH = 20
+# of a number in so many columns
+CARD_RTOL = 5e-13
 
 
 def field(value: float) -> str:
@@ -48,8 +53,35 @@ def _abaqus(law: LawTable, name: str) -> str:
     return interaction(name, cards)
 
 
-abaqus = Grammar(
+def read_cards(text: str, behaviour: str, conductance: str) -> list[Curve]:
+    """The rows below cards of such names, with the columns swapped back."""
+    curves = []
+    for keyword, name in ((conductance, "conductance"), (behaviour, "pressure")):
+        found = re.search(rf"^\*{re.escape(keyword)}\n((?:[^*\n].*\n)+)", text, re.M)
+        if found is not None:
+            lines = found[1].splitlines()
+            y, x = np.array([line.split(",") for line in lines], dtype=float).T
+            curves.append(Curve(name, x, y, CARD_RTOL))
+    return curves
+
+
+def _read(text: str) -> list[Curve]:
+    return read_cards(
+        text,
+        "SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR",
+        "GAP CONDUCTANCE, PRESSURE",
+    )
+
+
+abaqus = RowFormat(
+    name="abaqus",
     program="Abaqus",
+    output=(
+        "TABULAR, and with `--conductivity` also `*GAP CONDUCTANCE, PRESSURE`, with "
+        "`--friction` `*FRICTION, ELASTIC SLIP`, in one interaction"
+    ),
+    tested="written according to the manual, not tested",
+    read=_read,
     mark="**",
     body=dict.fromkeys(("pressure", *CONDUCTANCES), _abaqus),
     beyond=(

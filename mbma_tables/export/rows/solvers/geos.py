@@ -1,13 +1,14 @@
 """Hydraulic apertures for GEOS: `TableFunction`, `HydraulicApertureTable` and `BartonBandis`."""
 
 import math
+import re
 
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.export.law_table import LawTable
+from mbma_tables.export.law_table import Curve, LawTable
 from mbma_tables.export.rows.formula_fit import nearest_formula
-from mbma_tables.export.targets import SI, Grammar
+from mbma_tables.export.targets import SI, RowFormat
 from mbma_tables.export.text import about, comment, number
 
 # w = w0/(1 + 9 stress/reference)
@@ -98,8 +99,28 @@ def _listed(values: FloatArray) -> str:
     return f"{{ {', '.join(map(number, values))} }}"
 
 
-geos = Grammar(
+def _read(text: str) -> list[Curve]:
+    """The tables of the aperture against the stress."""
+    names = {"hydraulicAperture": "hydraulic_aperture", "aperture": "aperture"}
+    curves = []
+    for key, x, y in re.findall(
+        r'name="\w+_(\w+)" coordinates="\{(.*)\}"\n +values="\{(.*)\}"', text
+    ):
+        if key in names:
+            stress, values = np.array([x.split(","), y.split(",")], dtype=float)
+            curves.append(Curve(names[key], stress, values))
+    return curves
+
+
+geos = RowFormat(
+    name="geos",
     program="GEOS",
+    output=(
+        "`TableFunction`s of hydraulic aperture against jump and stress, its derivative, a "
+        "fitted `BartonBandis`"
+    ),
+    tested="GEOS's checks and interpolation, written again from its source",
+    read=_read,
     mark="<!--",
     body={"hydraulic_aperture": _geos},
     beyond=(

@@ -1,9 +1,12 @@
 """Contact laws as interpolated functions of GetDP; 3.2 was run."""
 
+import re
 from collections.abc import Iterable, Sequence
 
-from mbma_tables.export.law_table import LawTable
-from mbma_tables.export.targets import Grammar
+import numpy as np
+
+from mbma_tables.export.law_table import Curve, LawTable
+from mbma_tables.export.targets import RowFormat
 from mbma_tables.export.text import number
 
 
@@ -39,8 +42,25 @@ def _lines(law: LawTable, name: str, rows: str) -> list[str]:
     return lines
 
 
-getdp = Grammar(
+def _read(text: str) -> list[Curve]:
+    """The functions, by their lists; their names begin with that of the file."""
+    lists = {}
+    for name, numbers in re.findall(r"^  (\w+)\(\) = \{(.*)\};$", text, re.M):
+        lists[name] = np.array(numbers.split(","), dtype=float)
+    functions = re.findall(
+        r"^  (\w+)\[\] = InterpolationLinear\[\$1\]\{ListAlt\[(\w+)\(\), (\w+)\(\)\]\};$",
+        text,
+        re.M,
+    )
+    return [Curve(name, lists[x], lists[y]) for name, x, y in functions]
+
+
+getdp = RowFormat(
+    name="getdp",
     program="GetDP",
+    output="`InterpolationLinear` functions",
+    tested="GetDP 3.2: to 1e-6",
+    read=_read,
     mark="//",
     of_any=_functions,
     beyond=(

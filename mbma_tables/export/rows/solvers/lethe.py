@@ -1,17 +1,20 @@
 """Conductances for Lethe: the numbers of its formula, in `particle_heat_transfer.cc`."""
 
 import math
+import re
 
 import numpy as np
 
-from mbma_tables.export.law_table import LawTable
-from mbma_tables.export.targets import SI, Grammar
+from mbma_tables.export.law_table import Curve, LawTable
+from mbma_tables.export.targets import SI, RowFormat
 from mbma_tables.export.text import about, number, opening
 
 # h = 1.25 k_s m/sigma (p/H)^0.96 (Yovanovich), of which Lethe has the mean over Hertz's
 # pressure
 YOVANOVICH = 1.25
 EXPONENT = 0.96
+# points of a formula that is read back
+FITTED = 200
 
 
 def _lethe(law: LawTable) -> str:
@@ -57,8 +60,34 @@ def _lethe(law: LawTable) -> str:
     )
 
 
-lethe = Grammar(
+def _read(text: str) -> list[Curve]:
+    """The formula for two faces in the stated range, of a conductivity of 1 W/(m K).
+
+    Squares of roughness and slope add up, and the hardness is the harmonic mean.
+    """
+    pairs = re.findall(r"^ *set ([\w ]+) (?:particles|wall) = (\S+)$", text, re.M)
+    faces: dict[str, list[float]] = {}
+    for key, value in pairs:
+        faces.setdefault(key, []).append(float(value))
+    sigma = math.hypot(*faces["surface roughness"])
+    slope = math.hypot(*faces["surface slope"])
+    hardness = 2 / sum(1 / value for value in faces["microhardness"])
+    words = " ".join(text.replace("\n#", " ").split())
+    stated = re.search(r"\^0.96 is within (\S+) of .*? from p = (\S+) to (\S+) ", words)
+    assert stated is not None
+    misfit, low, high = map(float, stated.groups())
+    pressure = np.geomspace(low, high, FITTED)
+    conductance = YOVANOVICH * slope / sigma * (pressure / hardness) ** EXPONENT
+    # the misfit has two digits
+    return [Curve("solid_conductance", pressure, conductance, 1.05 * misfit)]
+
+
+lethe = RowFormat(
+    name="lethe",
     program="Lethe",
+    output="surface slope, roughness and microhardness",
+    tested="Lethe's formula, written again from its source: within the stated misfit",
+    read=_read,
     mark="#",
     body={"solid_conductance": _lethe},
     beyond=(

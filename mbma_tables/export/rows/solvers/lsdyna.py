@@ -3,14 +3,19 @@
 They are without *END, which would end the including deck.
 """
 
+import re
 from collections.abc import Sequence
 
-from mbma_tables.export.law_table import LawTable
-from mbma_tables.export.targets import CONDUCTANCES, STAY_WITHIN_ROWS, Grammar
-from mbma_tables.export.text import number
+import numpy as np
+
+from mbma_tables.export.law_table import Curve, LawTable, titled
+from mbma_tables.export.targets import CONDUCTANCES, STAY_WITHIN_ROWS, RowFormat
+from mbma_tables.export.text import comment, number
 
 # columns of a field
 WIDTH = 20
+# of a number in so many columns
+RTOL = 5e-13
 TAKES = ("pressure", *CONDUCTANCES, "tangential_stiffness", "leakage")
 
 
@@ -34,13 +39,31 @@ def _curves(laws: Sequence[LawTable]) -> str:
     titles = ""
     curves = ""
     for curve, law in enumerate(laws, 1):
-        titles += f"$ curve {curve}: {law.y_name} against {law.x_name}\n"
+        titles += comment([f"curve {curve}: {law.title}"], "$")
         curves += _curve(law, curve)
     return titles + curves
 
 
-lsdyna = Grammar(
+def _read(text: str) -> list[Curve]:
+    """Fields of the curves, by their titles; of a single one by the header's."""
+    titles = re.findall(r"^\$ curve \d+: (.*)$", text, re.M) or [text]
+    curves = []
+    blocks = text.split("*DEFINE_CURVE\n")[1:]
+    for title, block in zip(titles, blocks, strict=True):
+        # below the settings of the curve
+        lines = block.splitlines()[1:]
+        x = np.array([line[:WIDTH] for line in lines], dtype=float)
+        y = np.array([line[WIDTH : 2 * WIDTH] for line in lines], dtype=float)
+        curves.append(Curve(titled(title)[0], x, y, RTOL))
+    return curves
+
+
+lsdyna = RowFormat(
+    name="lsdyna",
     program="LS-DYNA",
+    output="`*DEFINE_CURVE`, to be included in a deck",
+    tested="parsed by ansys-dyna-core 0.12.1",
+    read=_read,
     mark="$",
     body=dict.fromkeys(TAKES, _curve),
     beyond=STAY_WITHIN_ROWS,

@@ -4,15 +4,16 @@ These are in its `module-hydrodynamic_plain_bearing2.cc`.
 """
 
 import math
+import re
 
 import numpy as np
 
 from mbma_tables.bodies.materials import tangential_ratio
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
-from mbma_tables.export.law_table import LawTable
+from mbma_tables.export.law_table import Curve, LawTable
 from mbma_tables.export.rows.formula_fit import nearest_formula
-from mbma_tables.export.targets import SI, Grammar
+from mbma_tables.export.targets import SI, RowFormat
 from mbma_tables.export.text import about, number, opening
 
 # p = 4.4086e-5 K E* (4 - (u - delta)/sigma)^6.804,
@@ -25,6 +26,8 @@ OF_K = 16 * math.sqrt(2) * math.pi / 15
 CROWDING = 0.05
 # largest A/A0 of that fit, and its fewest rows
 HEAVY = 0.1
+# points of a formula that is read back
+FITTED = 200
 FEWEST = 3
 # Poisson's ratio of the micro-slip stiffness
 NU = 0.3
@@ -109,8 +112,38 @@ def _greenwood_tripp(
     return numbers, misfit
 
 
-mbdyn = Grammar(
+def _read(text: str) -> list[Curve]:
+    """The pressure of Greenwood and Tripp's formula in the stated range of gaps."""
+    numbers = {}
+    for key, value in re.findall(r"^set: real \w+_(\w+) = (\S+);$", text, re.M):
+        numbers[key] = float(value)
+    words = " ".join(text.replace("\n#", " ").split())
+    stated = re.search(
+        r"fitted from p = .*?, u = (\S+) to (\S+) \w+: .*? root mean square, (\S+) at most",
+        words,
+    )
+    assert stated is not None
+    low, high, misfit = map(float, stated.groups())
+    u = np.linspace(low, high, FITTED)
+    sigma = numbers["sigma"]
+    beta = numbers["beta"]
+    crowding = numbers["eta"] * beta * sigma
+    modulus = OF_K * crowding**2 * math.sqrt(sigma / beta) * numbers["E"]
+    distance = END - (u - numbers["delta"]) / sigma
+    pressure = GREENWOOD_TRIPP * modulus * np.maximum(distance, 0.0) ** POWER
+    # the misfit is one of the logarithm, and has two digits
+    return [Curve("pressure", u, pressure, math.expm1(1.05 * misfit))]
+
+
+mbdyn = RowFormat(
+    name="mbdyn",
     program="MBDyn",
+    output=(
+        "a [film](lubrication.md#tables-for-other-codes) as parameters: Greenwood-Tripp "
+        "numbers, flow factors, micro-slip stiffness, with the keywords of the element"
+    ),
+    tested="MBDyn's formulas, written again from its source: within the stated misfit",
+    read=_read,
     mark="#",
     body={"film": _mbdyn},
     beyond="Include this file above the element.",

@@ -1,10 +1,17 @@
 """Contact laws as piecewise linear functions of MOOSE, by its `PiecewiseTabularBase`."""
 
+import re
 from collections.abc import Sequence
 
-from mbma_tables.export.law_table import LawTable
-from mbma_tables.export.rows.solvers.comsol import columns
-from mbma_tables.export.targets import Grammar
+import numpy as np
+
+from mbma_tables.export.law_table import Curve, LawTable, titled
+from mbma_tables.export.rows.solvers.comsol import (
+    below_comments,
+    columns,
+    read_columns,
+)
+from mbma_tables.export.targets import RowFormat
 from mbma_tables.export.text import number
 
 
@@ -35,8 +42,34 @@ def _blocks(law: LawTable, name: str) -> str:
     return text
 
 
-moose = Grammar(
+def _read_columns(text: str) -> list[Curve]:
+    return read_columns(below_comments(text, "#"), titled(text))
+
+
+def _read_functions(text: str) -> list[Curve]:
+    """The functions, whose names begin with that of the file."""
+    blocks = re.findall(
+        r"^  \[([A-Za-z]\w*)\]\n"
+        r"    type = PiecewiseLinear\n"
+        r"    x = '(.*)'\n"
+        r"    y = '(.*)'\n"
+        r"  \[\]$",
+        text,
+        re.M,
+    )
+    curves = []
+    for name, x, y in blocks:
+        abscissas, values = np.array([x.split(), y.split()], dtype=float)
+        curves.append(Curve(name, abscissas, values))
+    return curves
+
+
+moose = RowFormat(
+    name="moose",
     program="MOOSE",
+    output="columns with comments; of a film or aperture all columns",
+    tested="written according to the reader's source, not tested",
+    read=_read_columns,
     mark="#",
     of_any=columns,
     beyond=(
@@ -46,8 +79,12 @@ moose = Grammar(
     ),
 )
 # of conductances, by its `GapFluxModelConduction`
-moose_function = Grammar(
+moose_function = RowFormat(
+    name="moose-function",
     program="MOOSE",
+    output="`[Functions]`, one `PiecewiseLinear` for each column",
+    tested="parsed back",
+    read=_read_functions,
     mark="#",
     of_any=_functions,
     beyond=(
