@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+import numpy as np
 
 from mbma_tables.cli.export import write_first
 from mbma_tables.cli.format import (
     Report,
     assumption_notes,
+    column_unit,
     columns_of,
     to_json,
     validity_of,
@@ -31,12 +33,13 @@ from mbma_tables.cli.options import (
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import MAX_BYTES, read_file, write_file, written_bytes
 from mbma_tables.common.progress import echo
+from mbma_tables.common.toml_files import read_toml, with_settings
 from mbma_tables.export.targets import targets
 from mbma_tables.export.text import written_by
 from mbma_tables.surfaces.surface import assumptions
 
 if TYPE_CHECKING:
-    pass
+    from mbma_tables.design.joint import Joint
 
 SUFFIXES = (".nc", ".csv")
 toml_file = click.argument("file", type=click.Path(path_type=Path))
@@ -123,14 +126,29 @@ def _flag(name: str) -> str:
     return "--without-heat" if name == "heat" else f"--{name.replace('_', '-')}"
 
 
-def _export_joint(file: Path, out: Path, target: str, **options: Any) -> None:
-    """Write the joint of a file for another program."""
+def _joint(file: Path | None, settings: tuple[str, ...]) -> Joint:
+    """The joint of a file, of settings, or of both."""
     from mbma_tables.design.joint import Joint
 
-    digest = hashlib.sha256(read_file(file, MAX_BYTES)).hexdigest()
-    command = written_by(click.get_current_context().obj[1:], "joint")
-    options["made_by"] = f"input {file}: sha256 {digest}", command
-    joint = Joint.from_toml(file)
+    if file is None and not settings:
+        raise InputError(
+            "a joint is needed: its FILE, or its numbers by --set NAME=VALUE"
+        )
+    entries = {} if file is None else read_toml(file, "joint")
+    path = Path("--set") if file is None else file
+    return Joint.from_entries(with_settings(entries, settings), path)
+
+
+def _export_joint(
+    file: Path | None, settings: tuple[str, ...], out: Path, target: str, **options: Any
+) -> None:
+    """Write the joint of a file for another program."""
+    made_by = [written_by(click.get_current_context().obj[1:], "joint")]
+    if file is not None:
+        digest = hashlib.sha256(read_file(file, MAX_BYTES)).hexdigest()
+        made_by.insert(0, f"input {file}: sha256 {digest}")
+    options["made_by"] = tuple(made_by)
+    joint = _joint(file, settings)
     if str(out) == "-":
         first = joint.export(target, **options)
         assert isinstance(first, str | bytes)
@@ -162,10 +180,71 @@ _joint_options = option_group(
 )
 
 
+def _picture(joint: Joint, plot: Path | None) -> bytes:
+    """The picture of a joint, if one is asked for."""
+    from mbma_tables.common.plots import to_picture
+
+    return b"" if plot is None else to_picture(joint.plot(), plot.suffix[1:])
+
+
+def _report_of_ranges(
+    joint: Joint, pressures: list[Any], title: str, drawn: dict[str, Any]
+) -> Report:
+    """Medians and quantiles of a joint with ranges, with the shares of its inputs."""
+    found = joint.uncertainty(pressures, **drawn)
+    values: dict[str, Any] = {"pressure": found.pressure}
+    units = {"pressure": found.units["pressure"]}
+    for name, (low, median, high) in found.quantiles.items():
+        ends = {f"{name}_low": low, f"{name}_high": high}
+        values |= {name: median} | ends
+        units |= dict.fromkeys((name, *ends), column_unit(found.units[name]))
+    values["valid"] = np.where(found.valid, "yes", "no")
+    facts = joint.facts()
+    assumed = assumptions(joint.surface)
+    notes = [f"{name}: {text}" for name, text in facts.items() if name != "assumed"]
+    notes += assumption_notes(assumed)
+    notes.append(
+        f"median of {found.draws} draws (seed {found.seed}); low and high: quantiles "
+        "5% and 95%, of inputs and model"
+    )
+    for k, at in enumerate(found.pressure.tolist()):
+        notes += [
+            f"shares in {name} at {at:.4g} {units['pressure']}: {found.shares_text(name, k)}"
+            for name in found.quantiles
+        ]
+    notes += [f"not valid over the whole range: {reason}" for reason in found.reasons]
+    shares = {
+        quantity: {name: share.tolist() for name, share in of.items()}
+        for quantity, of in found.shares.items()
+    }
+    facts_of_draws = {
+        "draws": found.draws,
+        "seed": found.seed,
+        "shares": shares,
+        "valid": found.valid.tolist(),
+        "reasons": list(found.reasons),
+    }
+    return Report(
+        "joint",
+        title,
+        notes,
+        {**facts, "assumed": assumed, **facts_of_draws},
+        values,
+        units,
+    )
+
+
 @click.command(
     "joint", short_help="Stiffness, area, gap and conductance of two metal parts."
 )
-@toml_file
+@click.argument("file", type=click.Path(path_type=Path), required=False)
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="An entry of the file or in place of one: part_a.Ra='0.25..0.4 um'; may be repeated.",
+)
 @numbers_option(
     "--pressure",
     "-p",
@@ -178,19 +257,34 @@ _joint_options = option_group(
     help="In place of pressures: 40kN, on nominal_area.",
 )
 @plot_option
+@option_group(
+    "drawn",
+    given_values,
+    click.option(
+        "--draws", type=int, help="Of numbers that are ranges; 2000 by default."
+    ),
+    click.option("--seed", type=int, help="Of their random numbers; 0 by default."),
+)
 @_joint_options
 @file_options
 @output_options
 def joint_command(
-    file: Path,
+    file: Path | None,
+    settings: tuple[str, ...],
     pressure: list[float | str] | None,
     force: tuple[str, ...],
     plot: Path | None,
+    drawn: dict[str, Any],
     output: Output,
     export: dict[str, Any],
     asked: dict[str, Any],
 ) -> None:
     """Interface laws of the joint in FILE (TOML: bodies, nominal_area, part_a, part_b) at pressures.
+
+    Numbers may be ranges, '0.25..2.5 mm', or means with a deviation, '1.6 um +- 0.2 um':
+    the table then has the median of each quantity and its quantiles 5% and 95%, and lines
+    above it the shares of inputs. --set changes entries of the file, or makes a joint
+    without one.
 
     With --export the joint is written for another program instead, with conductance of
     solid spots and gas: any target of `mbma export` that takes a law.
@@ -199,6 +293,8 @@ def joint_command(
 
     Example: mbma joint examples/joint.toml --export abaqus --pressures 1MPa:50MPa --name
     JOINT --out joint.inp
+
+    Example: mbma joint examples/joint.toml --set part_a.longest='0.25..0.8 mm' --pressure 10MPa
     """
     export |= asked
     if "target" in export:
@@ -208,7 +304,7 @@ def joint_command(
             )
         if output.out is None:
             raise InputError("--export needs --out, the file to write")
-        _export_joint(file, output.out, **export)
+        _export_joint(file, settings, output.out, **export)
         return
     if export:
         raise InputError(
@@ -219,12 +315,19 @@ def joint_command(
             "pressures or forces are needed: --pressure or --force; or --export TARGET"
         )
     check_plot(plot, output.out)
-    from mbma_tables.common.plots import to_picture
-    from mbma_tables.design.joint import Joint
-
-    joint = Joint.from_toml(file)
+    joint = _joint(file, settings)
+    title = "joint of --set" if file is None else file.name
+    pressures = pressure or [joint.pressure_of(each) for each in force]
+    if joint.inputs:
+        report = _report_of_ranges(joint, pressures, title, drawn)
+        report.write(output, plot, _picture(joint, plot))
+        return
+    if drawn:
+        raise InputError(
+            "--draws and --seed are of a joint with ranges, and this has none"
+        )
     joint.require_one("a table")
-    found = joint.at_pressure(pressure or [joint.pressure_of(each) for each in force])
+    found = joint.at_pressure(pressures)
     values, units = columns_of(found, uncertainties=True)
     facts = joint.facts() | {"theory": found.theory}
     # a line for each assumption, as of other commands
@@ -233,12 +336,11 @@ def joint_command(
     notes += assumption_notes(assumed)
     lines, validity = validity_of(found)
     notes += lines
-    picture = b"" if plot is None else to_picture(joint.plot(), plot.suffix[1:])
     Report(
         "joint",
-        file.name,
+        title,
         notes,
         {**facts, "assumed": assumed, **validity},
         values,
         units,
-    ).write(output, plot, picture)
+    ).write(output, plot, _picture(joint, plot))

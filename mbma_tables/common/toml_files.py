@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import pathlib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mbma_tables.common.arguments import nearest
@@ -27,6 +28,41 @@ def read_toml(path: pathlib.Path, what: str) -> dict[str, Any]:
     except (ValueError, RecursionError) as fault:
         raise InputError(f"{path} is not a TOML file: {fault}") from None
     return entries
+
+
+def with_settings(entries: Mapping[str, Any], settings: Sequence[str]) -> dict[str, Any]:
+    """Entries with others set by texts such as "part_a.Ra=1.6 um": a value of TOML, else a text.
+
+    Raises
+    ------
+    InputError
+        For a text without a name or a value, a name given twice, and a name below an entry
+        that is no table.
+    """
+    made = copy.deepcopy(dict(entries))
+    names = set[str]()
+    for setting in settings:
+        name, separator, value = (part.strip() for part in setting.partition("="))
+        if not (name and separator and value) or name in names:
+            raise InputError(f"settings are NAME=VALUE, each name once, got {setting!r}")
+        names.add(name)
+        table = made
+        *tables, last = name.split(".")
+        for each in tables:
+            table = table.setdefault(each, {})
+            if not isinstance(table, dict):
+                raise InputError(f"{setting!r}: {each!r} is no table of the file")
+        table[last] = _value(value)
+    return made
+
+
+def _value(text: str) -> Any:
+    """A value as TOML has it, or else the text."""
+    try:
+        entries = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text
+    return entries["value"] if entries.keys() == {"value"} else text
 
 
 def check(entries: Mapping[str, Any], rules: Mapping[str, Any]) -> None:

@@ -476,12 +476,20 @@ class Joint(JointQuantities, Displayed):
         'aluminium 6061 hard'
         """
         path = pathlib.Path(path)
-        content = read_toml(path, "joint")
-        for name in ("part_a", "part_b"):
-            if isinstance(content.get(name), Mapping) and "map" in content[name]:
-                content[name]["map"] = path.parent / content[name]["map"]
+        return cls.from_entries(read_toml(path, "joint"), path)
+
+    @classmethod
+    def from_entries(
+        cls, entries: Mapping[str, Any], path: pathlib.Path = pathlib.Path("joint")
+    ) -> Joint:
+        """The joint of the entries of a TOML file, whose path is that of a file of maps and of messages."""
+        given = dict(entries)
+        for name in FACES:
+            part = given.get(name)
+            if isinstance(part, Mapping) and "map" in part:
+                given[name] = {**part, "map": path.parent / part["map"]}
         try:
-            return cls(**content)
+            return cls(**given)
         except TypeError as fault:
             raise InputError(f"{path}: {fault}") from None
 

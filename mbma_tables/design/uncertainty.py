@@ -345,21 +345,27 @@ class Uncertainty(Displayed):
         label = pressure_label(self.units["pressure"])
         return draw_panels(self.pressure[order], panels, label, title)
 
+    def shares_text(self, name: str, k: int) -> str:
+        """The shares in a quantity at the k-th pressure that are known, in whole percent."""
+        percents = {
+            of: round(100 * float(share[k]))
+            for of, share in self.shares[name].items()
+            if np.isfinite(share[k])
+        }
+        return ", ".join(f"{of} {percent}%" for of, percent in percents.items())
+
     def __str__(self) -> str:
         lines = []
         for k, pressure in enumerate(self.pressure):
             lines.append(f"at {pressure:.4g} {self.units['pressure']}".removesuffix(" 1"))
             for name, rows in self.quantiles.items():
                 numbers = " ".join(f"{number:.4g}" for number in rows[:, k])
-                shares = ", ".join(
-                    f"{of} {share[k]:.0%}"
-                    for of, share in self.shares[name].items()
-                    if np.isfinite(share[k])
-                )
                 unit = self.units[name]
                 quantiles = f"{numbers} {unit}".removesuffix(" 1")
-                lines.append(f"  {name}: {quantiles}; {shares}")
+                lines.append(f"  {name}: {quantiles}; {self.shares_text(name, k)}")
         levels = ", ".join(f"{level:g}" for level in self.levels)
+        if self.reasons:
+            lines.append(f"not valid over the whole range: {'; '.join(self.reasons)}")
         return "\n".join([f"quantiles {levels}, and shares in the variance", *lines])
 
 

@@ -1,10 +1,13 @@
 """Numbers that are not known: quantiles, shares and replicas against Monte Carlo, and refused ranges."""
 
 import dataclasses
+import json
+import pathlib
 import time
 
 import numpy as np
 import pytest
+from helpers import refused, run
 from scipy import stats
 
 from mbma_tables import (
@@ -369,3 +372,62 @@ def test_ranges_as_they_are_typed(text, low, median, high):
 @pytest.mark.parametrize("text", ["1.6 um", 1.6, [1.0, 2.0], {"name": "air"}, None])
 def test_other_numbers_are_no_distributions(text):
     assert distribution_of("Ra", text) is None
+
+
+EXAMPLE = str(pathlib.Path(__file__).parents[2] / "examples" / "joint.toml")
+
+
+def test_the_command_prints_the_band_and_the_shares(found, tmp_path):
+    path = tmp_path / "joint.toml"
+    path.write_text(
+        """
+        nominal_area = "3..5 cm^2"
+        bodies.metals = ["steel 4140 hard", "aluminium 6061 hard"]
+        bodies.hardness = "0.9..1.1 GPa"
+        bodies.conductivity = ["40..50 W/(m K)", "167 W/(m K)"]
+        part_a = {Ra = "0.4 um +- 0.04 um", hurst = 0.8, longest = "500 um", shortest = "8 um"}
+        part_b = {Ra = "0.5..0.7 um", hurst = 0.8, longest = "500 um", shortest = "8 um"}
+        """
+    )
+    text = run("joint", path, "--pressure", PRESSURE)
+    assert f"shares in area at 0.01 GPa: {found.shares_text('area', 0)}" in text
+    printed = json.loads(run("joint", path, "--pressure", PRESSURE, "--json"))
+    for name, rows in found.quantiles.items():
+        columns = [printed["columns"][f"{name}{end}"] for end in ("_low", "", "_high")]
+        np.testing.assert_array_equal(columns, rows)
+    assert printed["shares"]["area"]["model"] == found.shares["area"]["model"].tolist()
+    other = json.loads(run("joint", path, "-p", PRESSURE, "--json", "--seed", 5))
+    assert other["columns"]["area"] != printed["columns"]["area"]
+
+
+def test_settings_stand_for_entries_of_the_file_or_for_a_file():
+    known = run("joint", EXAMPLE, "--pressure", PRESSURE)
+    assert run("joint", EXAMPLE, "--set", "part_a.Rq=0.4 um", "-p", PRESSURE) == known
+    entries = ["nominal_area=4 cm^2", "friction=0.2", "gas=air"]
+    entries.append("bodies=['steel 4140 hard', 'aluminium 6061 hard']")
+    for part, Rq in (("part_a", "0.4 um"), ("part_b", "0.7 um")):
+        face = {"Rq": Rq, "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+        entries += [f"{part}.{name}={value}" for name, value in face.items()]
+    settings = [word for entry in entries for word in ("--set", entry)]
+    alone = run("joint", *settings, "-p", PRESSURE)
+    assert alone.partition("\n")[2] == known.partition("\n")[2]
+    wider = run("joint", EXAMPLE, "--set", "part_a.Rq=0.3..0.5 um", "-p", PRESSURE)
+    assert "part_a.Rq: 0.3..0.5 um" in wider
+    export = ["--export", "csv", "--pressures", "1MPa:50MPa", "--out", "-"]
+    rougher = run("joint", EXAMPLE, "--set", "part_a.Rq=0.8 um", *export)
+    assert rougher != run("joint", EXAMPLE, *export)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["-p", PRESSURE], "a joint is needed: its FILE, or its numbers by --set"),
+        ([EXAMPLE, "--set", "part_a.Rq", "-p", "1MPa"], "settings are NAME=VALUE"),
+        ([EXAMPLE, "--set", "gas.name=air", "-p", "1MPa"], "'gas' is no table"),
+        ([EXAMPLE, "--set", "part_a.Rz=1 um", "-p", "1MPa"], "no argument 'Rz'"),
+        ([EXAMPLE, "--seed", "1", "-p", "1MPa"], "--seed are of a joint with ranges"),
+        ([EXAMPLE, "--set", "part_a.Rq=2..1 um", "-p", "1MPa"], "upside down"),
+    ],
+)
+def test_settings_and_ranges_of_the_command_are_checked(words, message):
+    assert message in refused("joint", *words)
