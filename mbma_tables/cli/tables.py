@@ -3,6 +3,7 @@
 import functools
 import json
 import os
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import click
 from mbma_tables.cli.format import Report
 from mbma_tables.cli.options import Output, json_option, numbers_option, output_options
 from mbma_tables.common import cache
+from mbma_tables.common.arguments import nearest
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import write_file, written_bytes
 from mbma_tables.common.netcdf import OWN, OWN_REMEDY, holds_own, read_own
@@ -85,13 +87,14 @@ def _read_aloud(forecast: Any) -> str:
 
 
 @tables_group.command("make")
-@click.argument("kind", type=click.Choice(KINDS))
+@click.argument("kind", metavar="{universal|island4d|MODULE:FUNCTION}")
 @click.option(
     "--config",
     type=click.Path(path_type=Path),
-    help="TOML file that changes the shipped configuration; --example prints one.",
+    help="TOML file: changes the shipped configuration of a kind, or has the axes of a "
+    "function; --example prints one.",
 )
-@click.option("--target", type=float, help="Largest relative error on held-out points.")
+@click.option("--target", type=float, help="Largest error on held-out points.")
 @click.option("--out", type=click.Path(path_type=Path), help="File to write.")
 @click.option(
     "--workers",
@@ -104,6 +107,19 @@ def _read_aloud(forecast: Any) -> str:
 @click.option(
     "--dry-run", is_flag=True, help="Print points, time and size; make nothing."
 )
+@click.option(
+    "--resume", is_flag=True, help="Of a function: go on with a run that ended early."
+)
+@click.option(
+    "--part",
+    metavar="K/N",
+    help="Of a function: make part K of N; `mbma tables merge` makes the table of all.",
+)
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Of a function: dask scheduler whose workers call it, such as tcp://host:8786.",
+)
 def make_command(
     kind: str,
     config: Path | None,
@@ -112,19 +128,34 @@ def make_command(
     workers: int,
     example: bool,
     dry_run: bool,
+    **of_function: Any,
 ) -> None:
-    """Make a table of KIND: of two numbers (universal) or of the paper's four (island4d).
+    """Make a table of a KIND of islands, or of any function of 1 to 6 numbers.
 
-    The table is certified on points that no node saw and written whole, or not at all.
+    Islands are those of two numbers (universal) or of the paper's four (island4d); a
+    function is one of a Python module, such as my_model:force. The table is certified on
+    points that no node saw and written whole, or not at all.
 
     Example: mbma tables make island4d --target 1e-3 --out mine.nc
     """
     from mbma_tables.tables import make
-    from mbma_tables.tables.configuration import load
 
+    if kind not in KINDS and ":" not in kind:
+        raise InputError(
+            f"KIND is {', '.join(KINDS)}, or a function as module:function, got {kind!r}; "
+            f"{nearest(kind, KINDS)}"
+        )
     if example:
         echo(make.example(kind), nl=False)
         return
+    if ":" in kind:
+        _make_of_function(kind, config, target, out, workers, dry_run, **of_function)
+        return
+    given = [name for name, value in of_function.items() if value]
+    if given:
+        raise InputError(f"--{given[0]} is for tables of functions, got KIND {kind}")
+    from mbma_tables.tables.configuration import load
+
     configuration = load(kind, config, target)
     if dry_run:
         echo(_read_aloud(make.forecast(configuration, workers)))
@@ -133,6 +164,64 @@ def make_command(
         raise InputError("--out must name the file to write, such as --out mine.nc")
     content = make.make_table(configuration, out, workers)
     echo(make.summary(out, content))
+
+
+def _part_of(text: str | None) -> tuple[int, int] | None:
+    """K and N of "K/N"."""
+    if text is None:
+        return None
+    numbers = re.fullmatch(r"(\d+)/(\d+)", text)
+    if numbers is None:
+        raise InputError(f"--part must be K/N, such as 1/4, got {text!r}")
+    return int(numbers[1]), int(numbers[2])
+
+
+def _make_of_function(
+    reference: str,
+    config: Path | None,
+    target: float | None,
+    out: Path | None,
+    workers: int,
+    dry_run: bool,
+    resume: bool,
+    part: str | None,
+    scheduler: str | None,
+) -> None:
+    from mbma_tables.tables import make_function
+    from mbma_tables.tables.make import check_place
+
+    if config is None:
+        raise InputError(
+            "--config must name a TOML file with the axes of the function; --example prints one"
+        )
+    wanted = make_function.load(config, reference, target)
+    if dry_run:
+        echo(make_function.forecast(wanted))
+        return
+    if out is None:
+        raise InputError("--out must name the file to write, such as --out mine.nc")
+    check_place(out)
+    table = make_function.make(wanted, out, workers, resume, _part_of(part), scheduler)
+    if table is None:
+        echo(f"part {part}: its pieces are in {make_function.folder_of(out)}")
+        return
+    echo(f"{out}: {table!r}; {out.stat().st_size} bytes")
+
+
+@tables_group.command("merge")
+@click.argument("out", type=click.Path(path_type=Path))
+@click.argument("folders", nargs=-1, type=click.Path(path_type=Path))
+def merge_command(out: Path, folders: tuple[Path, ...]) -> None:
+    """Make the table OUT of pieces that were made in parts, in FOLDERS (default: OUT.pieces).
+
+    Example: mbma tables merge mine.nc
+    """
+    from mbma_tables.tables import make_function
+    from mbma_tables.tables.make import check_place
+
+    check_place(out)
+    table = make_function.merge(out, list(folders) or [make_function.folder_of(out)])
+    echo(f"{out}: {table!r}; {out.stat().st_size} bytes")
 
 
 @tables_group.command("info")
@@ -180,9 +269,9 @@ def sample_command(table: str, output: Output, **axes: list[float] | None) -> No
 
     Example: mbma tables sample universal --X 1,2 --mu 0.1
     """
-    from mbma_tables.tables.open import open_table
+    from mbma_tables.tables.open import open_islands
 
-    model = open_table(table)
+    model = open_islands(table)
     needed = ("X", "mu") if model.name == UNIVERSAL else tuple(axes)[:4]
     given = {name: values for name, values in axes.items() if values is not None}
     if set(given) != set(needed):

@@ -233,6 +233,8 @@ def write_own(
     path: os.PathLike[str] | str,
     variables: Mapping[str, tuple[tuple[str, ...], Any, str, str]],
     attributes: Mapping[str, str],
+    kind: str = OWN,
+    version: str = OWN_FORMAT,
 ) -> None:
     """Write variables (dimensions, values, long_name, units) and attributes whole.
 
@@ -242,8 +244,8 @@ def write_own(
 
     arrays = {name: np.asarray(entry[1], float) for name, entry in variables.items()}
     attributes_of_file = {
-        "mbma_kind": OWN,
-        "format_version": OWN_FORMAT,
+        "mbma_kind": kind,
+        "format_version": version,
         "values_sha256": digest_arrays(arrays),
         **attributes,
     }
@@ -269,21 +271,31 @@ def write_own(
         raise TableFileError(f"cannot write {path}: {fault}") from None
 
 
-def read_own(path: os.PathLike[str] | str) -> tuple[dict[str, Any], dict[str, Any]]:
+def read_own(
+    path: os.PathLike[str] | str,
+    kind: str = OWN,
+    version: str = OWN_FORMAT,
+    remedy: str = OWN_REMEDY,
+) -> tuple[dict[str, Any], dict[str, Any]]:
     """Values and attributes of such a file; TableFileError where damaged or edited."""
-    with opened(path, OWN_REMEDY) as dataset:
+    with opened(path, remedy) as dataset:
         attributes_of_file, _, values = verified(
             dataset, ("mbma_kind", "format_version", "values_sha256")
         )
-        if (attributes_of_file["mbma_kind"], attributes_of_file["format_version"]) != (
-            OWN,
-            OWN_FORMAT,
-        ):
+        of_file = tuple(
+            attributes_of_file[name] for name in ("mbma_kind", "format_version")
+        )
+        if of_file != (kind, version):
             raise ValueError(
-                f"holds a {attributes_of_file['mbma_kind']} of format {attributes_of_file['format_version']}, not a "
-                f"{OWN} of {OWN_FORMAT}"
+                f"holds a {of_file[0]} of format {of_file[1]}, not a {kind} of {version}"
             )
         lost = [name for name, array in values.items() if not np.isfinite(array).all()]
         if lost:
             raise ValueError(f"has variable {lost[0]}, which is not finite")
     return values, attributes_of_file
+
+
+def kind_of(path: os.PathLike[str] | str, remedy: str = REMEDY) -> str:
+    """The kind of a table's file, whose checksum is verified."""
+    with opened(path, remedy) as dataset:
+        return str(getattr(dataset, "mbma_kind", ""))

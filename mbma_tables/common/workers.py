@@ -1,6 +1,7 @@
 """Jobs, here or in processes of this machine."""
 
 import concurrent.futures
+import contextlib
 import itertools
 import multiprocessing
 import os
@@ -8,6 +9,10 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
+
+from mbma_tables.common.arguments import needed
+
+Crew = Callable[[Callable[..., Any], Sequence[tuple[Any, ...]]], Iterator[Any]]
 
 
 def end_with(parent: int) -> None:
@@ -21,6 +26,33 @@ def end_with(parent: int) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
+@contextlib.contextmanager
+def crew(workers: int = 1, scheduler: str | None = None) -> Iterator[Crew]:
+    """What runs jobs: a function of work and jobs that yields results in the order of the jobs.
+
+    One worker is this process; others are processes of this machine, or the workers of a
+    dask scheduler by its address.
+    """
+    if scheduler is not None:
+        client = needed("distributed").Client(scheduler)
+        try:
+            yield lambda work, jobs: (
+                future.result() for future in client.map(work, *zip(*jobs, strict=True))
+            )
+        finally:
+            client.close()
+        return
+    if workers == 1:
+        yield itertools.starmap
+        return
+    # started afresh: threads and forks do not mix
+    start = multiprocessing.get_context("spawn")
+    with concurrent.futures.ProcessPoolExecutor(
+        workers, start, end_with, (os.getpid(),)
+    ) as pool:
+        yield lambda work, jobs: pool.map(work, *zip(*jobs, strict=True))
+
+
 def results(
     label: str,
     work: Callable[..., Any],
@@ -30,14 +62,5 @@ def results(
     """``work(*job)`` of each job, in order, with a progress bar of that name where stderr is a terminal."""
     from tqdm import tqdm
 
-    # started afresh: threads and forks do not mix
-    start = multiprocessing.get_context("spawn")
-    with concurrent.futures.ProcessPoolExecutor(
-        workers, start, end_with, (os.getpid(),)
-    ) as pool:
-        found = (
-            itertools.starmap(work, jobs)
-            if workers == 1
-            else pool.map(work, *zip(*jobs, strict=True))
-        )
-        yield from tqdm(found, label, len(jobs), disable=None)
+    with crew(workers) as run:
+        yield from tqdm(run(work, jobs), label, len(jobs), disable=None)

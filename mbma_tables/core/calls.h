@@ -252,6 +252,83 @@ static bool do_island_answers(const argument *a, long long *answer) {
     return true;
 }
 
+/* ---- cells.c ---- */
+
+/* Whether coefficients end with those of the last cell. */
+static bool coefficients_end(size_t count, size_t cells, size_t axes, size_t outputs,
+                             const int64_t *starts, const int32_t *terms) {
+    if (cells == 0)
+        return count == 0;
+    size_t size = outputs;
+    for (size_t k = 0; k < axes; k++) {
+        const int32_t of_axis = terms[(cells - 1) * axes + k];
+        if (of_axis < 1 || of_axis > MBMA_MAX_TERMS)
+            return false;
+        size *= (size_t)of_axis;
+    }
+    const int64_t start = starts[cells - 1];
+    return start >= 0 && (size_t)start <= count && count - (size_t)start == size;
+}
+
+static bool do_cell_answers(const argument *a, long long *answer) {
+    enum { AXES, EXPONENTIAL, BRANCHES, MIDDLES, STARTS, TERMS, COEFFICIENTS, BOUNDS, X };
+    enum { VALUES = X + 1, WITH_SLOPES, SLOPES, ERRORS, CELLS };
+    enum { AXIS_NUMBERS = 7, LOW = 0, HIGH, OFFSET, FIRST, LAST, IS_LOG, OUTSIDE };
+    const size_t axes = a[AXES].count / AXIS_NUMBERS, outputs = a[EXPONENTIAL].count;
+    const size_t cells = a[STARTS].count;
+    if (axes < 1 || axes > MBMA_MAX_AXES || a[AXES].count != axes * AXIS_NUMBERS || outputs < 1)
+        return false;
+    if (a[BRANCHES].count != 2 * a[MIDDLES].count || a[TERMS].count != cells * axes ||
+        a[BOUNDS].count != cells * outputs)
+        return false;
+    if (!coefficients_end(a[COEFFICIENTS].count, cells, axes, outputs, a[STARTS].items,
+                          a[TERMS].items))
+        return false;
+    const size_t n = a[X].count / axes;
+    if (a[X].count != n * axes || a[VALUES].count != n * outputs || a[ERRORS].count != n * outputs ||
+        a[CELLS].count != n)
+        return false;
+    const bool slopes = a[WITH_SLOPES].whole != 0;
+    if (a[SLOPES].count != (slopes ? n * outputs * axes : 0))
+        return false;
+
+    const double *const numbers = a[AXES].items;
+    mbma_axis axis[MBMA_MAX_AXES];
+    for (size_t k = 0; k < axes; k++) {
+        const double *const of_axis = numbers + k * AXIS_NUMBERS;
+        axis[k] = (mbma_axis){
+            .low = of_axis[LOW],
+            .high = of_axis[HIGH],
+            .offset = of_axis[OFFSET],
+            .first = of_axis[FIRST],
+            .last = of_axis[LAST],
+            .is_log = of_axis[IS_LOG] == 1.0,
+            .outside = of_axis[OUTSIDE] == 1.0   ? MBMA_NEAREST
+                       : of_axis[OUTSIDE] == 2.0 ? MBMA_PERIODIC
+                                                 : MBMA_REFUSED,
+        };
+    }
+    const mbma_cell_table table = {
+        .axes = axes,
+        .outputs = outputs,
+        .boxes = a[MIDDLES].count,
+        .cells = cells,
+        .coefficient_count = a[COEFFICIENTS].count,
+        .axis = axis,
+        .is_exponential = a[EXPONENTIAL].items,
+        .branches = a[BRANCHES].items,
+        .terms = a[TERMS].items,
+        .starts = a[STARTS].items,
+        .middles = a[MIDDLES].items,
+        .coefficients = a[COEFFICIENTS].items,
+        .errors = a[BOUNDS].items,
+    };
+    *answer = (long long)mbma_cell_answers(&table, n, a[X].items, a[VALUES].items,
+                                           slopes ? a[SLOPES].items : NULL, a[ERRORS].items,
+                                           a[CELLS].items);
+    return true;
+}
+
 /* ---- profile.c ---- */
 
 enum { PANEL_RULES = 3, PANEL_PLACES = MBMA_PANEL_NODES + MBMA_PANEL_CHECKS };
@@ -710,6 +787,7 @@ static bool do_spectrum_law_separation(const argument *a, long long *answer) {
     FN(island_bands, "Dn Dn Dn D8 wn wn wn wn") \
     FN(island_places, "Dn Dn Dn Dn D8 wn wn wn wn wn wn wn") \
     FN(island_answers, "Dn Dn Dn Dn Dn " ISLAND_TABLE "wn wn wn") \
+    FN(cell_answers, "D J J D L J D D D w i w w l") \
     FN(profile_islands, "Dn d d d D8 " TABLE "w4n w1") \
     FN(profile_missed, PANELS "d wn") \
     FN(profile_series, PANELS "w wn w wm wm l") \

@@ -111,6 +111,35 @@ size_t mbma_island_answers(size_t n, const double *X, const double *spread, cons
 mbma_status mbma_island_lookup(const mbma_island_table *table, double approach, double zeta_d, double zeta_u,
                                double hurst, double out[3]);
 
+/* ---- cells.c: tables of any function ------------------------------------------------------------------------------ */
+
+enum { MBMA_MAX_AXES = 6, MBMA_MAX_TERMS = 24 };
+enum { MBMA_REFUSED = 0, MBMA_NEAREST = 1, MBMA_PERIODIC = 2 }; /* what an axis answers outside its range */
+enum { MBMA_POLYNOMIAL = -1, MBMA_NO_ANSWER = -2 };             /* boxes that are not halved */
+
+/* An axis: its range, and that of the coordinate on which boxes are halved, x or ln(x + offset). */
+typedef struct {
+    double low, high, offset, first, last;
+    int is_log, outside;
+} mbma_axis;
+
+/* Boxes, of which the first is the whole range: the axis at whose `middle` a box is halved and the number of its lower
+ * half, which the upper follows; or MBMA_POLYNOMIAL and the number of a cell, or MBMA_NO_ANSWER. A cell has its terms
+ * along each axis, where its coefficients start, those of one output after the other with the last axis fastest, and a
+ * bound on the error of each output, relative for those whose logarithm is stored (`is_exponential`). */
+typedef struct {
+    size_t axes, outputs, boxes, cells, coefficient_count;
+    const mbma_axis *axis;
+    const int32_t *is_exponential, *branches, *terms;
+    const int64_t *starts;
+    const double *middles, *coefficients, *errors;
+} mbma_cell_table;
+
+/* Outputs at points, `x` (n, axes): `values` (n, outputs), unless NULL `slopes` (n, outputs, axes), and `errors`
+ * (n, outputs); NaN where the table has no answer. `cells` (n) are the numbers of the cells, -1 where there is none. */
+size_t mbma_cell_answers(const mbma_cell_table *table, size_t n, const double *x, double *values, double *slopes,
+                         double *errors, int64_t *cells);
+
 /* ---- profile.c: one surface at many gaps ------------------------------------------------------------------------ */
 
 enum { MBMA_PANEL_NODES = 16, MBMA_PANEL_CHECKS = 3, MBMA_PANEL_GAPS = 10, MBMA_PANEL_ROWS = 4 };

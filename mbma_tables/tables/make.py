@@ -4,6 +4,7 @@ import os
 import pathlib
 
 from mbma_tables.common.errors import InputError
+from mbma_tables.tables import make_function
 from mbma_tables.tables.certificate import Forecast
 from mbma_tables.tables.configuration import HERE, Configuration
 from mbma_tables.tables.make_island4d import Island4d
@@ -15,10 +16,13 @@ KINDS: dict[str, type[Universal | Island4d]] = {UNIVERSAL: Universal, ISLAND4D: 
 
 
 def example(kind: str) -> str:
-    """The shipped configuration of a kind of table as TOML, with every key and what it means.
+    """A configuration of a kind of table, or of a function, as TOML, with every key and what it means.
 
-    Numbers of nodes are comments: where a file has none, they follow its target.
+    That of a kind is the shipped one. Its numbers of nodes are comments: where a file has
+    none, they follow its target.
     """
+    if kind not in KINDS:
+        return make_function.example()
     text = (HERE / f"{kind}.toml").read_text(encoding="utf-8")
     return text.replace("\nnodes = ", "\n# nodes = ")
 

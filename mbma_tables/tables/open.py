@@ -10,15 +10,18 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.common.netcdf import HDF5_LOCK
+from mbma_tables.common.netcdf import HDF5_LOCK, kind_of
 from mbma_tables.common.shared import shared
 from mbma_tables.islands import greenwood_tripp
+from mbma_tables.tables.function_table import KIND as FUNCTION
+from mbma_tables.tables.function_table import FunctionTable, read_function_table
 from mbma_tables.tables.island4d import Island4dModel, to_axes
-from mbma_tables.tables.reader import read_table
+from mbma_tables.tables.reader import REMEDY, read_table
 from mbma_tables.tables.schema import (
     ARGUMENTS,
     FUNCTIONS,
     ISLAND4D,
+    KINDS,
     UNIVERSAL,
     TableContent,
 )
@@ -44,13 +47,17 @@ def _opened(kind: str) -> UniversalModel | Island4dModel:
 
 def open_table(
     table: os.PathLike[str] | str = UNIVERSAL,
-) -> UniversalModel | Island4dModel:
+) -> UniversalModel | Island4dModel | FunctionTable:
     """A table as an island model, for the argument `island_model` of `contact`, `contact_law`, `island` and `Scene`.
 
     Parameters
     ----------
     table : {"universal", "island4d"} or path
         A shipped table, which is opened once, or a file, which is read on every call.
+
+    Returns
+    -------
+    UniversalModel, Island4dModel, or FunctionTable of a file that was made of a function
 
     Raises
     ------
@@ -72,11 +79,21 @@ def open_table(
     >>> float(summed.error) < 1e-8
     True
     """
+    of_file = isinstance(table, str | os.PathLike) and table not in KINDS
+    if of_file and kind_of(table, REMEDY.format("KIND")) == FUNCTION:
+        return read_function_table(table)
+    return open_islands(table)
+
+
+def open_islands(
+    table: os.PathLike[str] | str = UNIVERSAL,
+) -> UniversalModel | Island4dModel:
+    """A table of islands, shipped or of a file; `open_table` opens those of functions too."""
     if not isinstance(table, str | os.PathLike):
         raise InputError(
             f"a table must be {UNIVERSAL!r}, {ISLAND4D!r} or the path of a file, got {reprlib.repr(table)}"
         )
-    if table in (UNIVERSAL, ISLAND4D):
+    if table in KINDS:
         with HDF5_LOCK:
             return _opened(str(table))
     return _model(read_table(table))
@@ -84,7 +101,7 @@ def open_table(
 
 def universal_model() -> UniversalModel:
     """The model of the shipped universal table."""
-    model = open_table(UNIVERSAL)
+    model = open_islands(UNIVERSAL)
     assert isinstance(model, UniversalModel)
     return model
 

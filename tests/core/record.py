@@ -84,6 +84,25 @@ def recorded(using):
     return [call for found in calls.values() for call in found]
 
 
+def table_of_a_function():
+    """A table of two numbers and two outputs, three cells of four coefficients each."""
+    from mbma_tables.tables.function_table import FunctionAxis, FunctionTable, Output
+
+    axes = (
+        FunctionAxis("x", 0.0, 1.0, "log", 0.5),
+        FunctionAxis("y", 0.0, 2.0, outside="periodic"),
+    )
+    arrays = {
+        "branches": np.array([[0, 1], [-1, 0], [1, 3], [-1, 1], [-1, 2]]),
+        "middles": np.array([-0.3, 0.0, 1.0, 0.0, 0.0]),
+        "starts": np.array([0, 8, 16]),
+        "terms": np.full((3, 2), 2),
+        "coefficients": np.linspace(0.1, 1.0, 24),
+        "errors": np.full((3, 2), 1e-3),
+    }
+    return FunctionTable(axes, (Output("u"), Output("v", transform="log")), arrays, {})
+
+
 def use():
     """Call every function, by the library where it does."""
     from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
@@ -106,6 +125,9 @@ def use():
     four = np.linspace(1.0, 3.0, 300), 3.0, np.linspace(3.1, 400.0, 300), 0.8
     open_table("island4d").lookup(*four)
     band_fields(np.geomspace(1e-9, 1e3, 300), np.linspace(0, 1, 300), 0.7, REPORTED)
+    of_functions = table_of_a_function()
+    of_functions.lookup(np.linspace(0, 1, 300), 0.5)
+    of_functions.lookup(np.linspace(0, 1, 300), 3.7, derivatives=1)
     greenwood_tripp.rigid_sphere(X, mu)
     greenwood_tripp.solve(X[50:250:10], mu[50:250:10]).pressure.sum()
     one = Surface(0.7, 0.2, 60.0, 1.0, 3.0)

@@ -289,9 +289,9 @@ def make_plan(problem: Problem) -> Plan:
 def certified_error(island_model: str | AnyModel, rtol: float) -> float:
     """Bound on the relative error of islands at `rtol`; NaN if only results have it."""
     if island_model == "universal":
-        from mbma_tables.tables.open import open_table
+        from mbma_tables.tables.open import open_islands
 
-        island_model = open_table(island_model)
+        island_model = open_islands(island_model)
     if isinstance(island_model, UniversalModel | Island4dModel):
         certificate = island_model.content.attributes
         return max(

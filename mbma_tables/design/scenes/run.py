@@ -498,13 +498,13 @@ def _hashes(steps: list[Step]) -> dict[str, str]:
     used = {step.island_model_name: step.island_model for step in steps}
     if not used.keys() & set(TABLES):
         return {}
-    from mbma_tables.tables.open import open_table
+    from mbma_tables.tables.open import open_islands
 
     hashes = {}
     for name in TABLES:
         if name in used:
             # a table is named, or is an object that a user opened
             island_model: Any = used[name]
-            table = open_table(name) if island_model == name else island_model
+            table = open_islands(name) if island_model == name else island_model
             hashes[name] = str(table.content.attributes["values_sha256"])
     return hashes

@@ -9,13 +9,13 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.islands import island_models as models
 from mbma_tables.islands.island_models import AnyModel
 from mbma_tables.islands.variants import Variant
-from mbma_tables.tables.open import open_table
+from mbma_tables.tables.open import open_islands
 
 
 @functools.lru_cache(maxsize=8)
 def _read(path: pathlib.Path, state: tuple[int, int] | None) -> AnyModel:
     """The table of a file in a state, read once, so that theories of one file are equal."""
-    return open_table(path)
+    return open_islands(path)
 
 
 def _of_file(path: pathlib.Path) -> AnyModel:
@@ -23,7 +23,7 @@ def _of_file(path: pathlib.Path) -> AnyModel:
     try:
         stat = path.stat()
     except OSError:
-        return open_table(path)
+        return open_islands(path)
     return _read(path.resolve(), (stat.st_mtime_ns, stat.st_size))
 
 
@@ -57,7 +57,7 @@ def get_model(island_model: str | AnyModel, rtol: float, variant: Variant) -> An
             return FormulaModel()
         if model in ("exact", "rigid"):
             return models.RigidModel() if model == "rigid" else models.exact_model(asked)
-        model = open_table(model)
+        model = open_islands(model)
     if isinstance(model, type) or not (
         isinstance(model, models.IslandModel | models.GeometryModel)
         and isinstance(getattr(model, "name", None), str)

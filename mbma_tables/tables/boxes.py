@@ -1,0 +1,438 @@
+"""Boxes of a table of any function: halved until a function is a polynomial on each, to a tolerance.
+
+A piece of the range grows in rounds. Each round asks for the function at some points, the
+Chebyshev nodes and test points of new boxes, or held-out points of the whole piece, and
+decides from its values which boxes are done, get more terms, or are halved. What a piece asks
+depends on nothing else, so that pieces can be made anywhere, ended and continued.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import MbmaError
+
+PENDING, POLYNOMIAL, NO_ANSWER = -3, -1, -2  # of boxes that are not halved; as in mbma.h
+# by the number of axes: terms at first and at most along an axis, test points of a box, and
+# how often an axis is halved where the function fails
+FIRST_TERMS = {1: 8, 2: 6, 3: 5, 4: 5, 5: 4, 6: 4}
+MOST_TERMS = {1: 16, 2: 10, 3: 8, 4: 7, 5: 6, 6: 6}
+TESTS = {1: 24, 2: 48, 3: 64, 4: 96, 5: 128, 6: 160}
+HALVINGS_AT_FAILURES = {1: 12, 2: 8, 3: 5, 4: 4, 5: 3, 6: 2}
+MOST_HALVINGS = (
+    36  # of an axis; where the function is still no polynomial, it is not smooth
+)
+MOST_TRIALS = 3  # of terms in one box
+AIM = 0.4  # of the target, for the tests of a box
+BOUND = 2.0  # bound over the largest error at the tests of a box
+TRIMMED = 0.05  # of the target, what terms that are left out may add up to
+SLOWEST = 0.98  # ratio of one term to the one before, for estimates of what is left out
+MOST_ROUNDS = 8  # of held-out points
+ROUNDING = 1e-15
+
+
+class UnreachedError(MbmaError):
+    """A table that misses its target, or a function for which it cannot be reached."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Aim:
+    """How accurate each output is to be; arrays of shape (outputs,)."""
+
+    target: FloatArray
+    is_relative: NDArray[np.bool_]
+    least: FloatArray  # magnitude below which a relative error is that over `least`
+    is_exponential: NDArray[np.bool_]  # the logarithm is stored, its error is relative
+
+    def scale(self, values: FloatArray) -> FloatArray:
+        """What errors of stored values are divided by, for values of shape (outputs, ...)."""
+        shape = (-1, *(1,) * (values.ndim - 1))
+        plain = self.is_relative & ~self.is_exponential
+        size = np.maximum(np.abs(values), self.least.reshape(shape))
+        with np.errstate(divide="ignore"):
+            return np.where(plain.reshape(shape), size, 1.0)
+
+
+@functools.cache
+def nodes(terms: int) -> FloatArray:
+    """Chebyshev nodes in [-1, 1]."""
+    return np.asarray(-np.cos(np.pi * (np.arange(terms) + 0.5) / terms))
+
+
+@functools.cache
+def fit(terms: int) -> FloatArray:
+    """The matrix from values at the nodes to coefficients."""
+    angles = np.pi * (np.arange(terms)[:, None]) * (np.arange(terms)[::-1] + 0.5) / terms
+    matrix = 2.0 / terms * np.cos(angles)
+    matrix[0] *= 0.5
+    return np.asarray(matrix)
+
+
+@functools.cache
+def tests(axes: int) -> FloatArray:
+    """Test points of a box in [-1, 1], denser at its faces, shape (points, axes)."""
+    from scipy.stats import qmc
+
+    places = qmc.Halton(axes, scramble=True, seed=20260101).random(TESTS[axes])
+    return np.asarray(-np.cos(np.pi * places))
+
+
+def grid_of(terms: tuple[int, ...]) -> FloatArray:
+    """The nodes of a box in [-1, 1], shape (points, axes), the last axis fastest."""
+    grids = np.meshgrid(*map(nodes, terms), indexing="ij")
+    return np.stack([grid.ravel() for grid in grids], axis=-1)
+
+
+def coefficients_of(values: FloatArray) -> FloatArray:
+    """Chebyshev coefficients from values at the nodes, shape (outputs, *terms)."""
+    for axis in range(1, values.ndim):
+        matrix = fit(values.shape[axis])
+        values = np.moveaxis(np.tensordot(matrix, values, (1, axis)), 0, axis)
+    return np.ascontiguousarray(values)
+
+
+def value_at(coefficients: FloatArray, places: FloatArray) -> FloatArray:
+    """The polynomials at places in [-1, 1], shape (outputs, points)."""
+    count, axes = places.shape
+    last = chebyshev.chebvander(places[:, -1], coefficients.shape[-1] - 1)
+    sums = coefficients @ last.T  # (outputs, terms of the other axes, points)
+    for axis in range(axes - 2, -1, -1):
+        terms = coefficients.shape[axis + 1]
+        basis = chebyshev.chebvander(places[:, axis], terms - 1)
+        sums = np.einsum("...kp,pk->...p", sums, basis)
+    return np.asarray(sums).reshape(len(coefficients), count)
+
+
+def sizes_along(coefficients: FloatArray, axis: int) -> FloatArray:
+    """How large the terms of an axis are together: (outputs, terms)."""
+    others = tuple(a for a in range(1, coefficients.ndim) if a != axis + 1)
+    return np.asarray(2.0 * np.sqrt((coefficients**2).sum(axis=others)))
+
+
+def left_out(sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Estimate of the terms that follow, and the ratio of one to the next, of each output.
+
+    Sizes are taken to fall geometrically; those of even or odd functions vanish by turns.
+    """
+    terms = sizes.shape[-1]
+    if terms == 1:
+        return np.full(len(sizes), np.inf), np.full(len(sizes), SLOWEST)
+    last = sizes[:, -2:].max(axis=-1)
+    first = sizes[:, 1:3].max(axis=-1) if terms > 3 else sizes[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = (last / first) ** (1 / max(terms - 3, 1))
+    ratio = np.clip(np.nan_to_num(ratio, nan=0.0), 1e-3, SLOWEST)
+    return last * ratio / (1 - ratio), ratio
+
+
+@dataclasses.dataclass
+class Box:
+    """A box of the range, in coordinates on which boxes are halved."""
+
+    low: FloatArray
+    high: FloatArray
+    halvings: NDArray[np.int64]  # since the whole range, by axis
+    terms: tuple[int, ...]
+    axis: int = PENDING
+    child: int = -1  # number of the lower half
+    trials: int = 0
+    coefficients: FloatArray | None = None
+    error: FloatArray | None = None  # bound, by output
+
+    def at(self, places: FloatArray) -> FloatArray:
+        """Coordinates at places in [-1, 1]."""
+        middle, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
+        return np.asarray(np.clip(middle + half * places, self.low, self.high))
+
+    def place(self, points: FloatArray) -> FloatArray:
+        """Inverse of `at`."""
+        return np.asarray((2 * points - self.low - self.high) / (self.high - self.low))
+
+
+class Piece:
+    """A part of the range that grows on its own.
+
+    Parameters
+    ----------
+    low, high : ndarray
+        Its ends on each axis.
+    halvings : ndarray of int
+        How often each axis of the whole range was halved for it.
+    aim : Aim
+    held_out : int
+        Points on which it is checked, new ones in each round.
+    seed : int
+        Of these points.
+    marks : bool
+        Whether boxes in which the function has no value are left without an answer.
+    most : int
+        Coefficients of all its outputs, at most.
+    """
+
+    def __init__(
+        self,
+        low: FloatArray,
+        high: FloatArray,
+        halvings: NDArray[np.int64],
+        aim: Aim,
+        held_out: int,
+        seed: int,
+        marks: bool,
+        most: int,
+    ) -> None:
+        self.aim, self.held_out, self.seed, self.marks = aim, held_out, seed, marks
+        self.most = most
+        first = (FIRST_TERMS[low.size],) * low.size
+        self.boxes = [Box(low, high, halvings, first)]
+        self.round = 0  # of held-out points; 0 while boxes are pending
+        self.errors: FloatArray | None = None  # at held-out points, once it is done
+        self.excess = 0  # held-out points, of all rounds, above the bound of their box
+
+    @property
+    def axes(self) -> int:
+        """Number of axes."""
+        return self.boxes[0].low.size
+
+    @property
+    def pending(self) -> list[Box]:
+        """Boxes whose function values are to be asked next."""
+        return [box for box in self.boxes if box.axis == PENDING]
+
+    @property
+    def is_done(self) -> bool:
+        """Whether all boxes meet the target on held-out points."""
+        return self.errors is not None
+
+    @property
+    def size(self) -> int:
+        """Number of coefficients."""
+        sizes = [b.coefficients.size for b in self.boxes if b.coefficients is not None]
+        return sum(sizes)
+
+    def points(self) -> FloatArray:
+        """Where the function is asked next, shape (points, axes)."""
+        pending = self.pending
+        if not pending:
+            from scipy.stats import qmc
+
+            places = qmc.Halton(self.axes, seed=self.seed + self.round)
+            return self.boxes[0].at(2 * places.random(self.held_out) - 1)
+        parts = []
+        for box in pending:
+            parts += [box.at(grid_of(box.terms)), box.at(tests(self.axes))]
+        return np.concatenate(parts)
+
+    def take(self, values: FloatArray) -> None:
+        """Go on with the values at `points`, shape (points, outputs); NaN where there is none."""
+        stored = values.T.copy()
+        some = self.aim.is_exponential
+        stored[some] = np.log(stored[some])
+        pending = self.pending
+        if not pending:
+            self._check(self.points(), stored)
+            return
+        start = 0
+        for box in pending:
+            end = start + math.prod(box.terms)
+            last = end + TESTS[self.axes]
+            self._decide(box, stored[:, start:end], stored[:, end:last])
+            start = last
+        if self.size > self.most:
+            raise UnreachedError(
+                f"{self.most} coefficients do not reach the target; ask for a larger one, "
+                "a smaller range, or set max_coefficients"
+            )
+
+    def _decide(self, box: Box, at_nodes: FloatArray, at_tests: FloatArray) -> None:
+        """Whether a box is done, gets more terms, or is halved."""
+        together = np.concatenate([at_nodes, at_tests], axis=1)
+        if not np.isfinite(together).all():
+            self._decide_without_values(box, together)
+            return
+        box.trials += 1
+        series = coefficients_of(at_nodes.reshape(-1, *box.terms))
+        scale = self.aim.scale(together).min(axis=1)
+        scale_at_tests = self.aim.scale(at_tests)
+        error = np.abs(value_at(series, tests(self.axes)) - at_tests) / scale_at_tests
+        worst = error.max(axis=1)
+        aim = AIM * self.aim.target + ROUNDING * np.abs(together).max(axis=1) / scale
+        tails, ratios = np.empty((2, self.axes, len(scale)))
+        for axis in range(self.axes):
+            tail, ratios[axis] = left_out(sizes_along(series, axis))
+            tails[axis] = tail / scale
+        if (worst <= aim).all() and (tails.sum(axis=0) <= aim).all():
+            self._finish(box, series, at_tests, scale)
+            return
+        excess = (tails / aim).max(axis=1)  # by axis
+        more = self._more_terms(box, tails, ratios, aim)
+        few = more != box.terms and max(more) <= MOST_TERMS[self.axes]
+        if few and box.trials < MOST_TRIALS:
+            box.terms = more
+            return
+        terms = tuple(min(t, MOST_TERMS[self.axes]) for t in more)
+        self._halve(box, int(excess.argmax()), terms)
+
+    def _more_terms(
+        self, box: Box, tails: FloatArray, ratios: FloatArray, aim: FloatArray
+    ) -> tuple[int, ...]:
+        """Terms along each axis for which what is left out meets the aim."""
+        with np.errstate(divide="ignore"):
+            short = np.log(tails * self.axes / aim) / -np.log(ratios)
+        more = np.ceil(np.clip(short.max(axis=1), 0, 99)).astype(int)
+        return tuple(int(t + m) for t, m in zip(box.terms, more, strict=True))
+
+    def _finish(
+        self, box: Box, series: FloatArray, at_tests: FloatArray, scale: FloatArray
+    ) -> None:
+        """Keep a box with the terms that it needs, and a bound on its errors."""
+        allowed = TRIMMED * self.aim.target * scale
+        for axis in range(self.axes):
+            sizes = sizes_along(series, axis)
+            behind = np.cumsum(sizes[:, ::-1], axis=1)[:, ::-1]
+            needed = np.flatnonzero((behind > allowed[:, None]).any(axis=0))
+            count = int(needed.max(initial=0)) + 1
+            series = np.take(series, np.arange(count), axis=axis + 1)
+        error = np.abs(value_at(series, tests(self.axes)) - at_tests)
+        worst = (error / self.aim.scale(at_tests)).max(axis=1)
+        rounding = ROUNDING * np.abs(series).reshape(len(series), -1).sum(axis=1)
+        box.terms = series.shape[1:]
+        box.coefficients = np.ascontiguousarray(series)
+        box.error = BOUND * worst + 0.05 * self.aim.target + rounding / scale
+        box.axis = POLYNOMIAL
+
+    def _decide_without_values(self, box: Box, values: FloatArray) -> None:
+        """Halve a box in which the function has no value somewhere, or leave it without an answer."""
+        limit = HALVINGS_AT_FAILURES[self.axes]
+        axis = int(box.halvings.argmin())
+        if np.isnan(values).any(axis=0).all() or box.halvings[axis] >= limit:
+            box.axis = NO_ANSWER
+            return
+        self._halve(box, axis, (FIRST_TERMS[self.axes],) * self.axes)
+
+    def _halve(self, box: Box, axis: int, terms: tuple[int, ...]) -> None:
+        """Replace a box by its halves along an axis."""
+        halvings = box.halvings.copy()
+        halvings[axis] += 1
+        if halvings[axis] > MOST_HALVINGS:
+            if self.marks:
+                box.axis = NO_ANSWER
+                return
+            raise UnsmoothError(box.at(np.zeros(self.axes)))
+        middle = 0.5 * (box.low[axis] + box.high[axis])
+        ends = box.high.copy(), box.low.copy()
+        ends[0][axis] = ends[1][axis] = middle
+        box.axis, box.child = axis, len(self.boxes)
+        box.coefficients = box.error = None
+        self.boxes += [
+            Box(box.low, ends[0], halvings, terms),
+            Box(ends[1], box.high, halvings.copy(), terms),
+        ]
+
+    def cells_at(self, points: FloatArray) -> NDArray[np.int64]:
+        """Numbers of the boxes of points."""
+        found = np.zeros(len(points), dtype=np.int64)
+        going = np.arange(len(points))
+        while going.size:
+            boxes = [self.boxes[k] for k in found[going]]
+            axis = np.array([box.axis for box in boxes])
+            split = axis >= 0
+            going = going[split]
+            if not going.size:
+                break
+            chosen = [box for box, is_split in zip(boxes, split, strict=True) if is_split]
+            child = np.array([box.child for box in chosen])
+            middles = np.array([self.boxes[b.child].high[b.axis] for b in chosen])
+            found[going] = child + (points[going, axis[split]] >= middles)
+        return found
+
+    def _check(self, points: FloatArray, stored: FloatArray) -> None:
+        """Errors at held-out points; boxes that miss the target are halved."""
+        owners = self.cells_at(points)
+        errors = np.full(stored.shape, np.nan)
+        scale = self.aim.scale(stored)
+        again = False
+        for number in np.unique(owners):
+            box = self.boxes[number]
+            mine = np.flatnonzero(owners == number)
+            if box.axis == NO_ANSWER or box.coefficients is None or box.error is None:
+                continue
+            exact = stored[:, mine]
+            found = value_at(box.coefficients, box.place(points[mine]))
+            errors[:, mine] = np.abs(found - exact) / scale[:, mine]
+            worst = np.nan_to_num(errors[:, mine], nan=np.inf).max(axis=1)
+            if (worst > self.aim.target).any():
+                again = True
+                sizes = [
+                    left_out(sizes_along(box.coefficients, axis))[0].max()
+                    for axis in range(self.axes)
+                ]
+                self._halve(box, int(np.argmax(sizes)), box.terms)
+                continue
+            self.excess += int((errors[:, mine] > box.error[:, None]).any(axis=0).sum())
+            box.error = np.maximum(box.error, 1.5 * worst)
+        self.round += 1
+        if not again:
+            self.errors = errors.T
+        elif self.round >= MOST_ROUNDS:
+            raise UnreachedError(
+                f"after {MOST_ROUNDS} rounds of {self.held_out} held-out points the target "
+                "is still missed: the function is not smooth"
+            )
+
+    def state(self) -> dict[str, Any]:
+        """All that it has found so far, as arrays."""
+        boxes = self.boxes
+        answered = [
+            b for b in boxes if b.coefficients is not None and b.error is not None
+        ]
+        found: dict[str, Any] = {
+            "low": np.array([box.low for box in boxes]),
+            "high": np.array([box.high for box in boxes]),
+            "halvings": np.array([box.halvings for box in boxes]),
+            "terms": np.array([box.terms for box in boxes]),
+            "axis": np.array([box.axis for box in boxes]),
+            "child": np.array([box.child for box in boxes]),
+            "trials": np.array([box.trials for box in boxes]),
+            "coefficients": np.concatenate(
+                [np.empty(0), *(b.coefficients.ravel() for b in answered)]  # type: ignore[union-attr]
+            ),
+            "error": np.array([b.error for b in answered]),
+            "round": np.array([self.round, self.excess]),
+        }
+        return found | ({} if self.errors is None else {"errors": self.errors})
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from what `state` returned."""
+        names = ("low", "high", "halvings", "terms", "axis", "child", "trials")
+        self.boxes = [
+            Box(low, high, halvings, tuple(map(int, terms)), int(a), int(c), int(t))
+            for low, high, halvings, terms, a, c, t in zip(
+                *(state[name] for name in names), strict=True
+            )
+        ]
+        start, number, outputs = 0, 0, len(self.aim.target)
+        for box in self.boxes:
+            if box.axis == POLYNOMIAL:
+                end = start + outputs * math.prod(box.terms)
+                part = state["coefficients"][start:end]
+                box.coefficients = part.reshape(outputs, *box.terms)
+                box.error = state["error"][number]
+                start, number = end, number + 1
+        self.round, self.excess = map(int, state["round"])
+        self.errors = state.get("errors")
+
+
+class UnsmoothError(UnreachedError):
+    """A place at which the function is not smooth, in coordinates on which boxes are halved."""
+
+    def __init__(self, place: FloatArray) -> None:
+        super().__init__("the function is not smooth")
+        self.place = place

@@ -1,0 +1,556 @@
+"""Tables of any function of 1 to 6 numbers: values, slopes, inverses, each with a bound on its error."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+import os
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mbma_tables.common.arguments import (
+    FloatArray,
+    broadcast_shape,
+    finite_array,
+    is_labelled,
+    nearest,
+    require,
+)
+from mbma_tables.common.display import Variable, dataset_of
+from mbma_tables.common.errors import ConvergenceError, InputError, TableFileError
+from mbma_tables.common.interrupts import in_blocks
+from mbma_tables.common.netcdf import read_own
+from mbma_tables.core import core
+from mbma_tables.tables.boxes import NO_ANSWER, POLYNOMIAL, tests
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+KIND = "function"
+FORMAT = "1.0"
+REMEDY = (
+    "make it anew: `mbma tables make MODULE:FUNCTION --config AXES.toml --out TABLE.nc`"
+)
+MOST_AXES = 6
+OUTSIDE = ("raise", "nan", "nearest", "periodic")  # policies of an axis
+IN_CORE = {"raise": 0, "nan": 0, "nearest": 1, "periodic": 2}  # as in mbma.h
+BLOCK = 1 << 14  # points between two checks for Ctrl-C
+STEPS = 80  # of an inverse
+ROUNDING = 4e-15
+
+
+@dataclasses.dataclass(frozen=True)
+class FunctionAxis:
+    """An argument of the function: its range, the coordinate on which it is tabulated, its unit."""
+
+    name: str
+    low: float
+    high: float
+    transform: str = "linear"  # or "log": ln(x + offset)
+    offset: float = 0.0
+    unit: str = "1"
+    meaning: str = ""
+    outside: str = "raise"
+
+    def to_grid(self, x: Any) -> Any:
+        """The coordinate on which boxes are halved."""
+        shifted = np.asarray(x, dtype=float)
+        return np.log(shifted + self.offset) if self.transform == "log" else shifted
+
+    def from_grid(self, t: Any) -> Any:
+        """Inverse of `to_grid`, within the range."""
+        x = np.exp(t) - self.offset if self.transform == "log" else np.asarray(t)
+        return np.clip(x, self.low, self.high)
+
+
+@dataclasses.dataclass(frozen=True)
+class Output:
+    """A result of the function: how its error is measured, its unit."""
+
+    name: str
+    error: str = "relative"  # or "absolute"
+    least: float = 1e-300  # magnitude below which a relative error is that over `least`
+    transform: str = "linear"  # or "log": the logarithm is stored
+    unit: str = "1"
+    meaning: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Looked:
+    """Values of a table, bounds on their errors, and derivatives; dicts by the names of outputs.
+
+    Attributes
+    ----------
+    values : dict of str to ndarray
+        Each output, in the broadcast shape of the arguments.
+    error : dict of str to ndarray
+        Bounds on the absolute error of each.
+    derivatives : dict of str to dict of str to ndarray
+        By output and by axis; empty unless asked for.
+    derivative_error : dict of str to dict of str to ndarray
+        Bounds on their absolute errors.
+    """
+
+    values: dict[str, Any]
+    error: dict[str, Any]
+    derivatives: dict[str, dict[str, Any]]
+    derivative_error: dict[str, dict[str, Any]]
+
+    def __getitem__(self, output: str) -> Any:
+        return self.values[output]
+
+
+class FunctionTable:
+    """A table of any function, which `open_table` reads and `mbma tables make MODULE:FUNCTION` makes.
+
+    Parameters
+    ----------
+    axes : tuple of FunctionAxis
+    outputs : tuple of Output
+    arrays : dict
+        Tree and polynomials, by the names of the file's variables.
+    attributes : dict
+        Attributes of the file.
+    """
+
+    name = KIND
+
+    def __init__(
+        self,
+        axes: tuple[FunctionAxis, ...],
+        outputs: tuple[Output, ...],
+        arrays: Mapping[str, Any],
+        attributes: Mapping[str, Any],
+    ) -> None:
+        self.axes, self.outputs = axes, outputs
+        self.attributes = dict(attributes)
+        self._arrays = {name: np.asarray(array) for name, array in arrays.items()}
+
+    def __reduce__(self) -> Any:
+        return type(self), (self.axes, self.outputs, self._arrays, self.attributes)
+
+    def __repr__(self) -> str:
+        ranges = ", ".join(f"{a.name} {a.low:g} to {a.high:g}" for a in self.axes)
+        largest = json.loads(self.attributes["certificate"])["largest_error"]
+        errors = ", ".join(f"{name} {error:.2g}" for name, error in largest.items())
+        cells = self._arrays["starts"].size
+        return (
+            f"FunctionTable({self.attributes['function']}: covers {ranges}, {cells} cells, "
+            f"largest held-out error {errors})"
+        )
+
+    @functools.cached_property
+    def _core(self) -> tuple[Any, ...]:
+        """The table as arguments of the core."""
+        rows = [
+            (
+                *(axis.low, axis.high, axis.offset),
+                *map(float, (axis.to_grid(axis.low), axis.to_grid(axis.high))),
+                *(float(axis.transform == "log"), float(IN_CORE[axis.outside])),
+            )
+            for axis in self.axes
+        ]
+        logs = [output.transform == "log" for output in self.outputs]
+        whole = {"starts": np.int64, "branches": np.int32, "terms": np.int32}
+        arrays = {
+            name: np.ascontiguousarray(array, dtype=whole.get(name, np.float64)).ravel()
+            for name, array in self._arrays.items()
+        }
+        names = ("branches", "middles", "starts", "terms", "coefficients", "errors")
+        exponential = np.array(logs, dtype=np.int32)
+        return np.array(rows).ravel(), exponential, *(arrays[name] for name in names)
+
+    @functools.cached_property
+    def _widths(self) -> FloatArray:
+        """Widths of the cells in coordinates, shape (cells, axes)."""
+        _, low, high = self._ends
+        return high - low
+
+    @functools.cached_property
+    def _ends(self) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+        """Numbers of the boxes of cells, and their ends in coordinates, shape (cells, axes)."""
+        branches = self._arrays["branches"].astype(int)
+        middles = self._arrays["middles"]
+        low, high = np.empty((2, len(branches), len(self.axes)))
+        low[0] = [axis.to_grid(axis.low) for axis in self.axes]
+        high[0] = [axis.to_grid(axis.high) for axis in self.axes]
+        for box, (axis, child) in enumerate(branches):
+            if axis < 0:
+                continue
+            low[child : child + 2], high[child : child + 2] = low[box], high[box]
+            high[child, axis] = low[child + 1, axis] = middles[box]
+        boxes = np.flatnonzero(branches[:, 0] == POLYNOMIAL)
+        order = boxes[np.argsort(branches[boxes, 1])]
+        return order, low[order], high[order]
+
+    def _columns(
+        self, given: tuple[ArrayLike, ...], named: Mapping[str, ArrayLike]
+    ) -> list[ArrayLike]:
+        """The arguments in the order of the axes."""
+        names = [axis.name for axis in self.axes]
+        if len(given) > len(names):
+            raise InputError(
+                f"this table takes {', '.join(names)}, got {len(given)} numbers"
+            )
+        columns: dict[str, ArrayLike] = dict(zip(names, given, strict=False))
+        for name, value in named.items():
+            if name not in names:
+                raise InputError(
+                    f"this table has no axis {name!r}; {nearest(name, names)}"
+                )
+            if name in columns:
+                raise InputError(f"{name} is given twice")
+            columns[name] = value
+        missing = [name for name in names if name not in columns]
+        if missing:
+            raise InputError(
+                f"this table takes {', '.join(names)}: {missing[0]} is missing"
+            )
+        return [columns[name] for name in names]
+
+    def _answers(self, x: FloatArray, slopes: bool) -> tuple[Any, Any, Any, Any]:
+        """Values, slopes or None, bounds as stored and cells at points (points, axes)."""
+        count, outputs, axes = len(x), len(self.outputs), len(self.axes)
+        values, errors = np.empty((2, count, outputs))
+        by_axes = np.empty((count if slopes else 0, outputs, axes))
+        cells = np.empty(count, dtype=np.int64)
+
+        def fill(block: slice) -> None:
+            core.cell_answers(
+                *self._core,
+                x[block].ravel(),
+                values[block].reshape(-1),
+                int(slopes),
+                by_axes[block].reshape(-1),
+                errors[block].reshape(-1),
+                cells[block],
+            )
+
+        in_blocks(fill, count, BLOCK)
+        return values, by_axes, errors, cells
+
+    def _points(self, columns: list[ArrayLike]) -> tuple[FloatArray, tuple[int, ...]]:
+        """Points (points, axes) of arguments, those outside of an axis that raises refused."""
+        arrays: dict[str, FloatArray] = {}
+        for axis, column in zip(self.axes, columns, strict=True):
+            arrays[axis.name] = finite_array(axis.name, column)
+            if axis.outside == "raise":
+                array = arrays[axis.name]
+                inside = (array >= axis.low) & (array <= axis.high)
+                allowed = f"in [{axis.low:g}, {axis.high:g}], the range of this table"
+                require(axis.name, array, inside, allowed)
+        shape = broadcast_shape(**arrays)
+        flat = [np.broadcast_to(array, shape).ravel() for array in arrays.values()]
+        return np.ascontiguousarray(np.stack(flat, axis=-1)), shape
+
+    def lookup(
+        self, *arguments: ArrayLike, derivatives: int = 0, **named: ArrayLike
+    ) -> Looked:
+        """Values with bounds on their errors, and derivatives.
+
+        Parameters
+        ----------
+        *arguments, **named : array_like
+            The function's arguments, in the order of the axes or by name; they broadcast,
+            and DataArrays give DataArrays.
+        derivatives : {0, 1}
+            1: first derivatives by every axis too.
+
+        Returns
+        -------
+        Looked
+
+        Raises
+        ------
+        OutOfRangeError
+            Outside an axis whose policy is "raise".
+        InputError
+            For a name that is no axis, or NaN.
+        """
+        if derivatives not in (0, 1):
+            raise InputError(f"derivatives must be 0 or 1, got {derivatives!r}")
+        columns = self._columns(arguments, named)
+        if any(map(is_labelled, columns)):
+            return self._labelled(columns, derivatives)
+        x, shape = self._points(columns)
+        values, slopes, errors, cells = self._answers(x, derivatives == 1)
+        bounds = self._absolute(values, errors)
+        by_output: dict[str, dict[str, Any]] = {}
+        slope_errors: dict[str, dict[str, Any]] = {}
+        if derivatives:
+            most = self._slope_errors(x, bounds, cells)
+            for k, output in enumerate(self.outputs):
+                by_output[output.name], slope_errors[output.name] = (
+                    {
+                        axis.name: found[:, k, a].reshape(shape)[()]
+                        for a, axis in enumerate(self.axes)
+                    }
+                    for found in (slopes, most)
+                )
+        names = [output.name for output in self.outputs]
+        return Looked(
+            {name: values[:, k].reshape(shape)[()] for k, name in enumerate(names)},
+            {name: bounds[:, k].reshape(shape)[()] for k, name in enumerate(names)},
+            by_output,
+            slope_errors,
+        )
+
+    def _labelled(self, columns: list[ArrayLike], derivatives: int) -> Looked:
+        """The answer as DataArrays, with units."""
+        import xarray
+
+        together = xarray.broadcast(*map(xarray.DataArray, columns))
+        found = self.lookup(
+            *(column.values for column in together), derivatives=derivatives
+        )
+
+        def labelled(values: Any, unit: str) -> Any:
+            return together[0].copy(data=np.asarray(values)).assign_attrs(units=unit)
+
+        units = {output.name: output.unit for output in self.outputs}
+        nested = (
+            {
+                name: {a: labelled(v, "") for a, v in by_axis.items()}
+                for name, by_axis in part.items()
+            }
+            for part in (found.derivatives, found.derivative_error)
+        )
+        plain = (
+            {name: labelled(values, units[name]) for name, values in part.items()}
+            for part in (found.values, found.error)
+        )
+        return Looked(*plain, *nested)
+
+    def _absolute(self, values: FloatArray, errors: FloatArray) -> FloatArray:
+        """Bounds on absolute errors from those that are stored."""
+        bounds = errors.copy()
+        for k, output in enumerate(self.outputs):
+            size = np.abs(values[:, k])
+            if output.transform == "log":
+                bounds[:, k] = size * np.expm1(errors[:, k])
+            elif output.error == "relative":
+                # of the exact value, which may be larger by its error
+                bounds[:, k] *= np.maximum(size, output.least) / (
+                    1 - np.minimum(errors[:, k], 0.5)
+                )
+        return bounds
+
+    def _slope_errors(
+        self, x: FloatArray, bounds: FloatArray, cells: NDArray[np.int64]
+    ) -> FloatArray:
+        """Bounds on the errors of derivatives.
+
+        By Markov's inequality, for an error that behaves as a polynomial of twice the
+        terms of the cell: its slope is at most (2 terms)^2 times its largest value over
+        half the cell's width.
+        """
+        terms = self._arrays["terms"].astype(float)
+        factors = (2 * terms) ** 2 * 2 / self._widths
+        found = bounds[:, :, None] * factors[cells][:, None, :]
+        for a, axis in enumerate(self.axes):
+            if axis.transform == "log":
+                found[:, :, a] /= (x[:, a] + axis.offset)[:, None]
+        found[cells < 0] = np.nan
+        return np.asarray(found)
+
+    @functools.cached_property
+    def _directions(self) -> tuple[NDArray[np.int64], FloatArray]:
+        """By output and axis 1, -1, or 0 where slopes of both signs occur, and a place of the other sign."""
+        _, low, high = self._ends
+        places = 0.5 * (1 + tests(len(self.axes)))
+        t = low[:, None] + places * (high - low)[:, None]
+        points = np.stack(
+            [axis.from_grid(t[..., a]).ravel() for a, axis in enumerate(self.axes)],
+            axis=-1,
+        )
+        _, slopes, _, _ = self._answers(np.ascontiguousarray(points), True)
+        rises = np.nanmin(slopes, axis=0) > 0
+        falls = np.nanmax(slopes, axis=0) < 0
+        return rises.astype(int) - falls.astype(int), points[np.argmin(slopes, axis=0)]
+
+    def inverse(self, axis: str, **given: ArrayLike) -> tuple[Any, Any]:
+        """The number on an axis at which an output has a value, and a bound on its error.
+
+        Parameters
+        ----------
+        axis : str
+            The axis to solve for.
+        **given : array_like
+            One output, and all other axes; they broadcast.
+
+        Returns
+        -------
+        value, error : ndarray
+            In the unit of the axis.
+
+        Raises
+        ------
+        OutOfRangeError
+            Where the table does not reach the value; the message has the range.
+        InputError
+            If the output neither increases nor decreases everywhere along the axis.
+        """
+        names = [a.name for a in self.axes]
+        if axis not in names:
+            raise InputError(f"this table has no axis {axis!r}; {nearest(axis, names)}")
+        outputs = [output.name for output in self.outputs]
+        asked = [name for name in given if name in outputs]
+        if len(asked) != 1:
+            raise InputError(
+                f"give a value of one of {', '.join(outputs)}, got {len(asked)}"
+            )
+        k, a = outputs.index(asked[0]), names.index(axis)
+        direction = int(self._directions[0][k, a])
+        if direction == 0:
+            raise InputError(
+                f"{asked[0]} increases along {axis} at some places and decreases at others, "
+                "so that it has no inverse"
+            )
+        others = {name: value for name, value in given.items() if name != asked[0]}
+        columns = self._columns((), others | {axis: self.axes[a].low})
+        wanted = finite_array(asked[0], given[asked[0]])
+        x, shape = self._points([*columns, np.zeros(np.shape(wanted))][:-1])
+        whole = np.broadcast_shapes(shape, wanted.shape)
+        index = np.broadcast_to(np.arange(len(x)).reshape(shape), whole).ravel()
+        target = np.broadcast_to(wanted, whole).ravel()
+        found, error = self._solved(x[index], k, a, direction, target)
+        return found.reshape(whole)[()], error.reshape(whole)[()]
+
+    def _solved(
+        self, x: FloatArray, k: int, a: int, direction: int, target: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Newton's method along axis `a`, within ends between which output `k` reaches `target`."""
+        axis, output = self.axes[a], self.outputs[k]
+        ends = []
+        for end in (axis.low, axis.high)[::direction]:
+            x[:, a] = end
+            ends.append(self._answers(x, False)[0][:, k])
+        good = (target >= ends[0]) & (target <= ends[1])
+        limits = f"within {np.nanmin(ends[0]):g} to {np.nanmax(ends[1]):g}"
+        require(
+            output.name,
+            target,
+            good,
+            f"{limits}, which the table reaches along {axis.name}",
+        )
+        low, high = (
+            np.full(target.size, float(axis.to_grid(e))) for e in (axis.low, axis.high)
+        )
+        span = high[0] - low[0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            part = (target - ends[0]) / (ends[1] - ends[0])
+        part = np.nan_to_num(part, nan=0.5)
+        t = low + (part if direction > 0 else 1 - part) * span
+        active = np.arange(target.size)
+        for _ in range(STEPS):
+            points = x[active]
+            points[:, a] = axis.from_grid(t[active])
+            values, slopes, _, _ = self._answers(np.ascontiguousarray(points), True)
+            excess = direction * (values[:, k] - target[active])
+            by_t = slopes[:, k, a]
+            if axis.transform == "log":
+                by_t = by_t * (points[:, a] + axis.offset)
+            above = excess > 0
+            high[active[above]] = t[active[above]]
+            low[active[~above]] = t[active[~above]]
+            step = t[active] - excess / (direction * by_t)
+            inside = (step > low[active]) & (step < high[active])
+            middle = 0.5 * (low[active] + high[active])
+            step = np.where(inside, step, middle)
+            near = np.abs(excess) <= 1e-15 * np.abs(target[active])
+            moved = np.abs(step - t[active])
+            t[active] = np.where(near, t[active], step)
+            done = near | (moved <= 4e-16 * np.maximum(span, np.abs(t[active])))
+            active = active[~done]
+            if not active.size:
+                break
+        else:
+            raise ConvergenceError(f"the inverse along {axis.name} did not converge")
+        x[:, a] = axis.from_grid(t)
+        values, slopes, errors, _ = self._answers(x, True)
+        slope = np.abs(slopes[:, k, a])
+        bound = self._absolute(values, errors)[:, k]
+        with np.errstate(divide="ignore"):
+            error = bound / slope + ROUNDING * np.abs(x[:, a])
+        return x[:, a].copy(), error
+
+    def to_dataset(self, **axes: ArrayLike) -> xr.Dataset:
+        """Every output and the bound on its error on a grid, as an xarray Dataset.
+
+        Parameters
+        ----------
+        **axes : array_like
+            By name, each a number or of one dimension.
+        """
+        columns = self._columns((), axes)
+        lines = {
+            axis.name: np.atleast_1d(finite_array(axis.name, column))
+            for axis, column in zip(self.axes, columns, strict=True)
+        }
+        found = self.lookup(*np.ix_(*lines.values()))
+        names = tuple(lines)
+        variables = {
+            axis.name: Variable(lines[axis.name], axis.unit, axis.meaning, (axis.name,))
+            for axis in self.axes
+        }
+        for output in self.outputs:
+            meaning = output.meaning or output.name
+            variables[output.name] = Variable(
+                found.values[output.name], output.unit, meaning, names
+            )
+            variables[f"{output.name}_error"] = Variable(
+                found.error[output.name],
+                output.unit,
+                f"bound on the absolute error of {output.name}",
+                names,
+            )
+        return dataset_of(
+            variables, {"table": KIND, "function": self.attributes["function"]}
+        )
+
+
+def read_function_table(path: os.PathLike[str] | str) -> FunctionTable:
+    """The table of a file, checked; TableFileError where it is damaged or of another kind."""
+    values, attributes = read_own(path, KIND, FORMAT, REMEDY)
+    try:
+        axes = tuple(FunctionAxis(**entry) for entry in json.loads(attributes["axes"]))
+        outputs = tuple(Output(**entry) for entry in json.loads(attributes["outputs"]))
+        return checked(FunctionTable(axes, outputs, values, attributes))
+    except (KeyError, TypeError, ValueError) as fault:
+        raise TableFileError(f"{path}: {fault}; {REMEDY}") from None
+
+
+def checked(table: FunctionTable) -> FunctionTable:
+    """A table whose tree and polynomials fit together, or ValueError."""
+    arrays = table._arrays
+    branches, terms = arrays["branches"], arrays["terms"]
+    cells, axes, outputs = len(arrays["starts"]), len(table.axes), len(table.outputs)
+    if not 1 <= axes <= MOST_AXES or outputs < 1:
+        raise ValueError(f"has {axes} axes and {outputs} outputs")
+    shapes = {
+        "branches": (len(arrays["middles"]), 2),
+        "terms": (cells, axes),
+        "errors": (cells, outputs),
+    }
+    wrong = [name for name, shape in shapes.items() if arrays[name].shape != shape]
+    sizes = outputs * terms.prod(axis=1)
+    starts = np.concatenate([[0], np.cumsum(sizes)])
+    numbers = np.arange(len(branches))
+    halved = branches[:, 0] >= 0
+    ends = branches[:, 0] == POLYNOMIAL
+    if (
+        wrong
+        or (starts[:-1] != arrays["starts"]).any()
+        or starts[-1] != arrays["coefficients"].size
+        or (branches[halved, 1] <= numbers[halved]).any()
+        or (branches[halved, 1] + 1 >= len(branches)).any()
+        or sorted(branches[ends, 1]) != [*range(cells)]
+        or not (halved | ends | (branches[:, 0] == NO_ANSWER)).all()
+        or (branches[:, 0] >= axes).any()
+    ):
+        raise ValueError("has a tree and polynomials that do not fit together")
+    return table

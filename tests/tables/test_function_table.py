@@ -1,0 +1,472 @@
+"""Tables of any function: targets on points that nothing saw, bounds, derivatives, inverses, pieces, bad functions."""
+
+import json
+import os
+import pathlib
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import tabulated
+from click.testing import CliRunner
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mbma_tables import InputError, OutOfRangeError, TableFileError, open_table
+from mbma_tables.cli import main
+from mbma_tables.tables import make_function
+from mbma_tables.tables.boxes import UnreachedError
+from mbma_tables.tables.make_function import make, merge, verified_errors, wanted_of
+
+UNIT = {"low": 0.0, "high": 1.0}
+TWO = {"x": {"low": 0.01, "high": 10.0, "transform": "log"}, "y": UNIT}
+SMOOTH = {
+    "function": "tabulated:smooth",
+    "axes": TWO,
+    "outputs": {"u": {"unit": "N"}, "v": {"error": "absolute"}},
+    "certificate_points": 1000,
+}
+FUNCTIONS = {
+    "smooth": (SMOOTH, 1e-8),
+    "kinked": ({"axes": {"x": UNIT, "y": UNIT}}, 1e-6),
+    "steep": (
+        {"axes": {"x": UNIT, "y": UNIT}, "outputs": {"s": {"error": "absolute"}}},
+        1e-6,
+    ),
+    "periodic": (
+        {"axes": {"x": UNIT | {"outside": "periodic"}, "y": UNIT, "z": UNIT}},
+        1e-6,
+    ),
+    "four": ({"axes": dict.fromkeys("xyzw", UNIT)}, 1e-6),
+    "six": ({"axes": dict.fromkeys("abcdef", UNIT)}, 1e-4),
+}
+
+
+def made(folder, function, entries, target=None, **options):
+    wanted = wanted_of({"function": f"tabulated:{function}", **entries}, target=target)
+    return make(wanted, folder / "t.nc", **options)
+
+
+@pytest.fixture(scope="module")
+def smooth(tmp_path_factory):
+    return made(tmp_path_factory.mktemp("smooth"), "smooth", SMOOTH, 1e-8)
+
+
+def errors_of(table, count, seed=11):
+    """Largest error over its target, and how many exceed their bound, of points that no part of a table saw."""
+    worst = np.zeros(len(table.outputs))
+    above = 0
+    for block in verified_errors(table, count, seed):
+        error, bound, size = block.swapaxes(0, 1)
+        relative = [output.error == "relative" for output in table.outputs]
+        scale = np.where(np.array(relative)[:, None], size, 1.0)
+        worst = np.maximum(worst, (error / scale).max(axis=1))
+        above += int((error > bound).any(axis=0).sum())
+    return worst, above
+
+
+@pytest.mark.parametrize("function", FUNCTIONS)
+def test_targets_hold_on_points_that_nothing_saw(function, tmp_path):
+    entries, target = FUNCTIONS[function]
+    table = made(tmp_path, function, entries, target)
+    worst, above = errors_of(table, 20_000)
+    assert (worst <= target).all()
+    assert above == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("function", FUNCTIONS)
+def test_targets_hold_on_a_million_points(function, tmp_path):
+    entries, target = FUNCTIONS[function]
+    table = made(tmp_path, function, entries, target)
+    worst, above = errors_of(table, 1_000_000, seed=12)
+    assert (worst <= target).all()
+    assert above <= 10  # of a million, and none above the target
+
+
+@pytest.mark.slow
+def test_the_island_problem_as_a_users_function(tmp_path):
+    """On the axes of the shipped four-number table: certified, and its largest error beside that table's."""
+    axes = {
+        "X": {"low": 0.05, "high": 20.0, "transform": "log", "offset": 1.5},
+        "spread": {"low": 1e-3, "high": 10.0, "transform": "log"},
+        "sphere": UNIT,
+        "hurst": {"low": 0.5, "high": 1.0},
+    }
+    table = made(
+        tmp_path, "island", {"axes": axes, "outputs": {"F": {}, "A": {}}}, 1e-4, workers=2
+    )
+    worst, above = errors_of(table, 20_000)
+    assert (worst <= 1e-4).all()
+    assert above == 0
+
+
+def test_derivatives_are_within_their_bounds(smooth):
+    draws = np.random.default_rng(3)
+    x, y = np.exp(draws.uniform(np.log(0.01), np.log(10), 5000)), draws.random(5000)
+    found = smooth.lookup(x, y, derivatives=1)
+    u = np.exp(x * y / 5) * x**1.5
+    exact = {
+        ("u", "x"): u * (y / 5 + 1.5 / x),
+        ("u", "y"): u * x / 5,
+        ("v", "x"): np.cos(x) * y,
+        ("v", "y"): np.sin(x),
+    }
+    for (output, axis), expected in exact.items():
+        error = np.abs(found.derivatives[output][axis] - expected)
+        assert (error <= found.derivative_error[output][axis]).all()
+        assert (error <= 1e-5 * np.abs(expected).max()).all()
+
+
+def test_an_inverse_is_within_its_bound(smooth):
+    draws = np.random.default_rng(4)
+    x, y = np.exp(draws.uniform(np.log(0.01), np.log(10), 300)), draws.random(300)
+    u = tabulated.smooth(x, y)[0]
+    inside = (u > 1.0001 * u.min()) & (u < 0.9999 * u.max())
+    found, error = smooth.inverse("x", u=u[inside], y=y[inside])
+    assert (np.abs(found - x[inside]) <= error).all()
+    assert (error <= 1e-6 * x[inside]).all()
+    one, _ = smooth.inverse("x", u=float(u[0]), y=float(y[0]))
+    assert np.ndim(one) == 0
+    assert abs(one / x[0] - 1) < 1e-7
+
+
+def test_an_inverse_of_what_turns_back_or_is_not_reached_is_refused(smooth):
+    with pytest.raises(InputError, match="no inverse"):
+        smooth.inverse("x", v=0.2, y=0.5)
+    with pytest.raises(OutOfRangeError, match="u must be within"):
+        smooth.inverse("x", u=1e9, y=0.5)
+    with pytest.raises(InputError, match="one of u, v"):
+        smooth.inverse("x", y=0.5)
+
+
+def test_answers_broadcast_and_take_names(smooth):
+    grid = smooth.lookup(np.array([[0.5], [2.0]]), y=[0.0, 0.5, 1.0])
+    assert grid["u"].shape == (2, 3)
+    assert grid["u"][1, 2] == smooth.lookup(2.0, 1.0)["u"]
+    with pytest.raises(InputError, match="did you mean"):
+        smooth.lookup(0.5, yy=0.1)
+    with pytest.raises(InputError, match="y is missing"):
+        smooth.lookup(0.5)
+    with pytest.raises(OutOfRangeError, match=r"x must be in \[0.01, 10\]"):
+        smooth.lookup(11.0, 0.5)
+
+
+def test_labelled_arguments_give_labelled_answers(smooth):
+    xr = pytest.importorskip("xarray")
+    x = xr.DataArray([0.5, 1.0], dims="load")
+    y = xr.DataArray([0.1, 0.2, 0.3], dims="place")
+    found = smooth.lookup(x, y)
+    assert found["u"].dims == ("load", "place")
+    assert found["u"].attrs["units"] == "N"
+    data = smooth.to_dataset(x=[0.5, 1.0], y=0.2)
+    assert float(data["u"].sel(x=0.5, y=0.2)) == smooth.lookup(0.5, 0.2)["u"]
+
+
+def test_a_file_explains_itself_and_opens_again(smooth, tmp_path):
+    again = pickle.loads(pickle.dumps(smooth))
+    assert again.lookup(0.3, 0.4)["u"] == smooth.lookup(0.3, 0.4)["u"]
+    table = made(tmp_path, "four", FUNCTIONS["four"][0], 1e-3)
+    opened = open_table(tmp_path / "t.nc")
+    assert (
+        opened.lookup(0.1, 0.2, 0.3, 0.4)["value"]
+        == table.lookup(0.1, 0.2, 0.3, 0.4)["value"]
+    )
+    certificate = json.loads(opened.attributes["certificate"])
+    assert certificate["largest_error"]["value"] <= 1e-3
+    assert "1e-" in repr(opened) or "e-" in repr(opened)
+    content = (tmp_path / "t.nc").read_bytes()
+    for damaged in (content[:-200], content[:500] + b"x" + content[501:]):
+        (tmp_path / "bad.nc").write_bytes(damaged)
+        with pytest.raises(TableFileError, match=r"make|rebuild"):
+            open_table(tmp_path / "bad.nc")
+
+
+def test_a_table_of_a_function_is_no_island_model(tmp_path):
+    from mbma_tables import Surface, contact
+    from mbma_tables.theories import Mbma
+
+    made(tmp_path, "four", FUNCTIONS["four"][0], 1e-3)
+    with pytest.raises(TableFileError, match="holds a table of kind 'function'"):
+        contact(
+            Surface(0.8, 1.0, 200.0, 0.1, 0.3),
+            separation=0.1,
+            theory=Mbma(island_model=str(tmp_path / "t.nc")),
+        )
+
+
+def test_policies_of_axes(tmp_path):
+    axes = {
+        "x": UNIT | {"outside": "periodic"},
+        "y": UNIT | {"outside": "nearest"},
+        "z": UNIT | {"outside": "nan"},
+    }
+    table = made(tmp_path, "periodic", {"axes": axes}, 1e-6)
+    base = table.lookup(0.25, 1.0, 0.5)["value"]
+    assert table.lookup(2.25, 1.0, 0.5)["value"] == pytest.approx(base, rel=1e-12)
+    found = table.lookup(0.25, 7.0, 0.5, derivatives=1)
+    assert found["value"] == base
+    assert found.derivatives["value"]["y"] == 0
+    assert np.isnan(table.lookup(0.25, 1.0, 1.5)["value"])
+
+
+def bits(path):
+    table = open_table(path)
+    return [table._arrays[name].tobytes() for name in sorted(table._arrays)]
+
+
+def test_tables_are_the_same_by_one_process_two_or_in_parts(tmp_path):
+    wanted = wanted_of(SMOOTH, target=1e-6)
+    for name, options in {"one.nc": {}, "two.nc": {"workers": 2}}.items():
+        make(wanted, tmp_path / name, **options)
+    for part in (1, 2, 3):
+        assert make(wanted, tmp_path / "parts.nc", part=(part, 3)) is None
+    merge(tmp_path / "parts.nc", [tmp_path / "parts.nc.pieces"])
+    assert (
+        bits(tmp_path / "one.nc")
+        == bits(tmp_path / "two.nc")
+        == bits(tmp_path / "parts.nc")
+    )
+
+
+def test_parts_of_other_configurations_and_missing_pieces_are_refused(tmp_path):
+    make(wanted_of(SMOOTH, target=1e-6), tmp_path / "a.nc", part=(1, 2))
+    make(wanted_of(SMOOTH, target=1e-5), tmp_path / "b.nc", part=(2, 2))
+    folders = [tmp_path / "a.nc.pieces", tmp_path / "b.nc.pieces"]
+    with pytest.raises(InputError, match="another configuration"):
+        merge(tmp_path / "c.nc", folders)
+    with pytest.raises(InputError, match="8 of 16 pieces are not finished"):
+        merge(tmp_path / "c.nc", folders[:1])
+    with pytest.raises(InputError, match="holds no pieces"):
+        merge(tmp_path / "c.nc", [tmp_path])
+    with pytest.raises(InputError, match="another configuration"):
+        make(wanted_of(SMOOTH, target=1e-4), tmp_path / "a.nc", resume=True)
+    assert not (tmp_path / "c.nc").exists()
+
+
+@pytest.mark.parametrize("end", [3, 60])
+def test_a_run_that_was_killed_goes_on(end, tmp_path, monkeypatch):
+    """After SIGKILL in some call of the function: the same bits, and finished pieces are not made again."""
+    slow = SMOOTH | {"function": "tabulated:slow", "pieces": 4, "chunk": 64}
+    config = tmp_path / "axes.json"
+    config.write_text(json.dumps(slow))
+    program = (
+        "import json, pathlib, sys; from mbma_tables.tables.make_function import make, wanted_of; "
+        "make(wanted_of(json.loads(pathlib.Path(sys.argv[1]).read_text()), target=1e-4), "
+        "pathlib.Path(sys.argv[2]), resume=True)"
+    )
+    line = [sys.executable, "-c", program, str(config), str(tmp_path / "t.nc")]
+    counter = tmp_path / "calls"
+    paths = [
+        str(pathlib.Path(tabulated.__file__).parent),
+        os.environ.get("PYTHONPATH", ""),
+    ]
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join(paths),
+        "MBMA_TEST_CALLS": str(counter),
+        "MBMA_TEST_END": str(end),
+    }
+    killed = subprocess.run(line, env=environment, capture_output=True)
+    assert killed.returncode == -9
+    assert not (tmp_path / "t.nc").exists()
+    first = counter.stat().st_size
+    subprocess.run(line, env=environment, check=True, capture_output=True)
+    both = counter.stat().st_size
+    counter.unlink()
+    monkeypatch.setenv("MBMA_TEST_CALLS", str(counter))
+    monkeypatch.setenv("MBMA_TEST_END", "0")
+    make(wanted_of(slow, target=1e-4), tmp_path / "whole.nc")
+    whole = counter.stat().st_size
+    assert bits(tmp_path / "t.nc") == bits(tmp_path / "whole.nc")
+    # finished pieces are not asked again
+    assert first == end
+    assert both <= whole + end - (end > whole / 2) * whole / 4
+    assert not (tmp_path / "t.nc.pieces").exists()
+
+
+@pytest.mark.slow
+def test_workers_of_a_scheduler_make_the_same_table(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    wanted = wanted_of(SMOOTH, target=1e-4)
+    make(wanted, tmp_path / "here.nc")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster:
+        make(wanted, tmp_path / "there.nc", scheduler=cluster.scheduler_address)
+    assert bits(tmp_path / "here.nc") == bits(tmp_path / "there.nc")
+
+
+@pytest.mark.parametrize(
+    ("function", "outputs", "message"),
+    [
+        ("raises", {}, r"raised ZeroDivisionError: too deep; at x = 0\.[789]"),
+        (
+            "not_a_number",
+            {},
+            r"returned value = nan, not a finite number; at x = 0\.[789]",
+        ),
+        ("wrong_shape", {}, r"returned arrays of shape \(3,\) for"),
+        ("texts", {}, "returned what are no numbers"),
+        (
+            "negative",
+            {"f": {"transform": "log"}},
+            "not a finite number above 0; at x = 0",
+        ),
+        ("jump", {}, r"is not smooth at x = 0\.321[67]"),
+        ("single", {"square": {}}, "set vectorized = false"),
+    ],
+)
+def test_functions_that_cannot_be_tabulated_are_named(
+    function, outputs, message, tmp_path
+):
+    entries = {"axes": {"x": UNIT}, **({"outputs": outputs} if outputs else {})}
+    with pytest.raises((InputError, UnreachedError), match=message):
+        made(tmp_path, function, entries, 1e-6)
+    assert not (tmp_path / "t.nc").exists()
+
+
+def test_failures_are_marked_where_that_is_asked_for(tmp_path):
+    for function in ("raises", "not_a_number"):
+        table = made(
+            tmp_path, function, {"axes": {"x": UNIT | {"low": 0.1}}, "on_failure": "mark"}
+        )
+        inside = np.linspace(0.1, 0.69, 50)
+        exact = getattr(tabulated, function)(inside)
+        assert np.allclose(table.lookup(inside)["value"], exact, rtol=1e-6)
+        assert np.isnan(table.lookup(np.linspace(0.7001, 1, 50))["value"]).all()
+        certificate = json.loads(table.attributes["certificate"])
+        assert certificate["without_answer"] > 0
+
+
+def test_a_jump_is_marked(tmp_path):
+    table = made(tmp_path, "jump", {"axes": {"x": UNIT}, "on_failure": "mark"})
+    assert table.lookup([0.2, 0.9])["value"] == pytest.approx([1, 2])
+    assert np.isnan(table.lookup(0.3217)["value"]) or table.lookup(0.3217)["value"] in (
+        1,
+        2,
+    )
+
+
+def test_one_point_a_call(tmp_path):
+    table = made(
+        tmp_path,
+        "single",
+        {
+            "axes": {"x": {"low": 1.0, "high": 2.0}},
+            "outputs": {"cube": {}, "square": {}},
+            "vectorized": False,
+            "pieces": 1,
+            "certificate_points": 100,
+        },
+    )
+    assert table.lookup(1.5)["cube"] == pytest.approx(3.375, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("entries", "message"),
+    [
+        ({"axes": {"x": {"low": 1.0, "high": 0.0}, "y": UNIT}}, "low must be below high"),
+        (
+            {"axes": {"x": UNIT | {"transform": "log"}, "y": UNIT}},
+            "above 0 on a logarithmic",
+        ),
+        ({"axes": {"x": UNIT | {"offset": 1.0}, "y": UNIT}}, "of logarithmic axes alone"),
+        ({"axes": {"x": UNIT}}, "axes.y is missing"),
+        ({"axes": {"x": UNIT, "z": UNIT}}, "has no argument 'z'"),
+        ({"axes": {"x": UNIT, "y": UNIT}, "tarjet": 1e-3}, "did you mean 'target'"),
+        ({"axes": {"x": UNIT | {"lo": 1}, "y": UNIT}}, "did you mean 'low'"),
+        ({"axes": {"x": UNIT, "y": UNIT}, "outputs": {"x": {}}}, "an axis and an output"),
+        ({"axes": {"x": UNIT | {"low": float("nan")}, "y": UNIT}}, "must be finite"),
+        ({"axes": {"x": UNIT, "y": UNIT}, "function": "tabulated:smoth"}, "did you mean"),
+        (
+            {"axes": {"x": UNIT, "y": UNIT}, "function": "no_module:f"},
+            "cannot be imported",
+        ),
+        ({"axes": {"x": UNIT, "y": UNIT}, "function": "smooth"}, "module:function"),
+    ],
+)
+def test_wrong_configurations_are_refused_by_name(entries, message):
+    with pytest.raises(InputError, match=message):
+        wanted_of({"function": "tabulated:smooth"} | entries)
+
+
+def test_too_few_coefficients_are_named(tmp_path):
+    entries = SMOOTH | {"max_coefficients": 10, "pieces": 1}
+    with pytest.raises(UnreachedError, match="10 coefficients do not reach the target"):
+        made(tmp_path, "smooth", entries, 1e-10)
+    with pytest.raises(UnreachedError, match="coefficients do not reach the target"):
+        made(
+            tmp_path,
+            "diagonal",
+            {"axes": {"x": UNIT, "y": UNIT}, "max_coefficients": 3000, "pieces": 1},
+            1e-9,
+        )
+
+
+def test_the_command_makes_a_table(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    example = CliRunner().invoke(main, ["tables", "make", "a:b", "--example"])
+    assert example.exit_code == 0
+    assert "on_failure" in example.output
+    pathlib.Path("axes.toml").write_text(
+        "certificate_points = 500\n[axes.x]\nlow = 0.01\nhigh = 10.0\ntransform = 'log'\n"
+        "[axes.y]\nlow = 0.0\nhigh = 1.0\n[outputs.u]\n[outputs.v]\nerror = 'absolute'\n"
+    )
+    line = [
+        "tables",
+        "make",
+        "tabulated:smooth",
+        "--config",
+        "axes.toml",
+        "--target",
+        "1e-5",
+    ]
+    dry = CliRunner().invoke(main, [*line, "--dry-run"])
+    assert dry.exit_code == 0
+    assert "points in 16 pieces" in dry.output
+    for options in (["--out", "t.nc"], ["--part", "1/2", "--out", "p.nc"]):
+        done = CliRunner().invoke(main, [*line, "--workers", "1", *options])
+        assert done.exit_code == 0, done.output
+    assert "FunctionTable" in CliRunner().invoke(main, [*line, "--out", "t.nc"]).output
+    early = CliRunner().invoke(main, ["tables", "merge", "p.nc"])
+    assert early.exit_code != 0
+    assert "not finished" in early.output
+    CliRunner().invoke(main, [*line, "--workers", "1", "--part", "2/2", "--out", "p.nc"])
+    assert CliRunner().invoke(main, ["tables", "merge", "p.nc"]).exit_code == 0
+    assert bits("t.nc") == bits("p.nc")
+    for wrong in (["--resume"], ["--part", "1/2"]):
+        refused = CliRunner().invoke(main, ["tables", "make", "universal", *wrong])
+        assert refused.exit_code != 0
+        assert "for tables of functions" in refused.output
+    refused = CliRunner().invoke(main, [*line, "--part", "3/2", "--out", "q.nc"])
+    assert refused.exit_code != 0
+    assert "1 <= k <= n" in refused.output
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    st.lists(st.floats(-2, 2), min_size=3, max_size=3),
+    st.floats(0.2, 3.0),
+    st.integers(1, 6),
+)
+def test_polynomials_are_tabulated_exactly(factors, width, seed):
+    """A cubic in two numbers, by pieces alone, without files."""
+    from mbma_tables.tables.boxes import Aim, Piece
+
+    a, b, c = factors
+    aim = Aim(np.array([1e-9]), np.array([False]), np.array([1e-300]), np.array([False]))
+    piece = Piece(
+        np.zeros(2), np.full(2, width), np.zeros(2, int), aim, 200, seed, False, 10**6
+    )
+    while not piece.is_done:
+        x, y = piece.points().T
+        piece.take((a * x**3 + b * x * y * y + c)[:, None])
+    assert np.nanmax(piece.errors) < 1e-12
+    assert len(piece.boxes) == 1
+
+
+def test_the_forecast_calls_the_function_a_few_times():
+    text = make_function.forecast(wanted_of(SMOOTH))
+    assert "points in 16 pieces" in text
