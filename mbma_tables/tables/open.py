@@ -158,7 +158,7 @@ def verify(path: os.PathLike[str] | str, kind: str | None = None) -> Verdict:
             raise TableFileError(
                 f"{path}: the answers of {who} differ from the stored conformance points by {difference[worst]:.1e} "
                 f"where {points['tolerance'][worst[1]]:.1e} is allowed; rebuild the table with "
-                f"`python -m generate tables {content.kind}`"
+                f"`mbma tables make {content.kind} --out FILE.nc`"
             )
         errors.append(float(difference.max()))
     return Verdict(os.fspath(path), content.kind, points["tolerance"].size, *errors)

@@ -13,7 +13,7 @@ from mbma_tables.tables import schema
 if TYPE_CHECKING:
     import netCDF4
 
-REMEDY = "rebuild it with `python -m generate tables {}` or reinstall mbma_tables"
+REMEDY = "rebuild it with `mbma tables make {} --out FILE.nc` or reinstall mbma_tables"
 
 
 def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
@@ -58,7 +58,7 @@ def read_table(
     path: os.PathLike[str] | str, kind: str | None = None
 ) -> schema.TableContent:
     """Open and check a table file, which must be of a `kind` where one is given."""
-    with opened(path, REMEDY.format(kind or "all")) as dataset:
+    with opened(path, REMEDY.format(kind or "KIND")) as dataset:
         table_kind, version = (
             getattr(dataset, name, None) for name in ("mbma_kind", "format_version")
         )

@@ -82,7 +82,7 @@ def test_a_wrong_checksum_is_an_error(json_form, folder):
     ):
         message = refused("tables", *arguments, *json_form)
         assert f"{path}: is damaged (its checksum does not match)" in message
-        assert re.search("`python -m generate tables (all|universal)`", message)
+        assert re.search("`mbma tables make (KIND|universal) --out FILE.nc`", message)
 
 
 def test_a_missing_table_and_a_wrong_kind(folder):

@@ -31,7 +31,7 @@ def refused(path, kind=None):
         read_table(path, kind)
     message = str(caught.value)
     assert message.count(str(path)) == 1
-    assert message.count("`python -m generate tables ") == 1
+    assert message.count("`mbma tables make ") == 1
     assert "\n" not in message
     return message
 
@@ -127,7 +127,7 @@ def test_the_wrong_kind_under_a_right_name(sources, tmp_path):
         path.write_bytes(sources[other])
         message = refused(path, kind)
         assert f"holds a table of kind '{other}', not {kind}" in message
-        assert f"`python -m generate tables {kind}`" in message
+        assert f"`mbma tables make {kind} --out FILE.nc`" in message
         assert read_table(path).kind == other
 
 

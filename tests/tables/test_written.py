@@ -119,7 +119,7 @@ def test_an_answer_beyond_its_tolerance_is_refused(kind, name, who, tmp_path):
     write_table(tmp_path / "a.nc", with_points(kind, **{name: beyond(1.2)}))
     with pytest.raises(
         TableFileError,
-        match=rf"a\.nc: the answers of .*{who} .*`python -m generate tables {kind}`",
+        match=rf"a\.nc: the answers of .*{who} .*`mbma tables make {kind} --out FILE",
     ):
         verify(tmp_path / "a.nc")
 
