@@ -29,6 +29,7 @@ INTERRUPTED = 130  # as shells report Ctrl-C
 SAID = {
     "surface.fit()": "--model self-affine",
     "outside='exact'": "--island-model exact",
+    "outside='nan'": "--outside nan",
     "give the surface its unit": "give --length-unit",
 }
 

@@ -18,6 +18,7 @@ from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import write_file, written_bytes
 from mbma_tables.common.netcdf import OWN, OWN_REMEDY, holds_own, read_own
 from mbma_tables.common.progress import echo
+from mbma_tables.islands.island_models import OUTSIDE
 from mbma_tables.tables.reader import read_table
 from mbma_tables.tables.schema import KINDS, UNIVERSAL
 
@@ -261,11 +262,21 @@ def info_command(table: str, as_json: bool) -> None:
 @numbers_option("--hurst", help="and Hurst exponent.")
 @numbers_option("--X", "X", help="Depth, of a table of two numbers,")
 @numbers_option("--mu", help="and stiffness of the roughness.")
+@click.option(
+    "--outside",
+    type=click.Choice(OUTSIDE),
+    default="raise",
+    show_default=True,
+    help="Where the table has no island: an error, the exact solver, or NaN.",
+)
 @output_options
-def sample_command(table: str, output: Output, **axes: list[float] | None) -> None:
+def sample_command(
+    table: str, output: Output, outside: str, **axes: list[float] | None
+) -> None:
     """Force, area and error of TABLE (a kind or a file) at all combinations of the numbers.
 
-    Islands outside the table are refused. With --out FILE.nc it is a netCDF file.
+    Combinations with zeta_u <= zeta_d are no islands, and NaN with --outside nan.
+    With --out FILE.nc it is a netCDF file.
 
     Example: mbma tables sample universal --X 1,2 --mu 0.1
     """
@@ -279,7 +290,7 @@ def sample_command(table: str, output: Output, **axes: list[float] | None) -> No
             f"a table of kind {model.name} takes {', '.join(needed)}, "
             f"got {', '.join(given) or 'none'}"
         )
-    found = model.to_dataset(**given, outside="raise")
+    found = model.to_dataset(**given, outside=outside)
     if output.out is not None and output.out.suffix == ".nc":
         write = functools.partial(found.to_netcdf, engine="netcdf4")
         write_file(output.out, written_bytes("sample.nc", write))

@@ -30,7 +30,7 @@ MEANINGS = {
     "error": "bound on the relative error of force and area",
 }
 OUTSIDE_MEANS = {
-    "nan": "NaN where the table does not cover the island",
+    "nan": "NaN where the table does not cover the island, or no such island exists",
     "exact": "the exact solver where the table does not cover the island",
     "raise": "no island outside the table",
 }

@@ -158,6 +158,7 @@ class Island4dModel:
             Hurst exponent.
         outside : {"raise", "exact", "nan"}
             For islands that the table does not cover: an error, the exact solver, or NaN.
+            Combinations with zeta_u <= zeta_d are no islands: NaN for "nan", else an error.
 
         Returns
         -------
@@ -201,7 +202,9 @@ class Island4dModel:
             require("zeta_d", low, low > 1, "above 1")
         else:
             self._refuse_ends(H, low)
-        require("zeta_u", high, high > low, "above zeta_d")
+        if outside != "nan":
+            ordered = "above zeta_d (outside='nan' leaves NaN there)"
+            require("zeta_u", high, high > low, ordered)
         place = to_axes(
             approach.ravel(), low.ravel(), high.ravel(), H.ravel(), self.variant
         )

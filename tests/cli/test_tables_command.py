@@ -113,6 +113,14 @@ def test_a_sample_has_the_lookups_at_all_combinations():
     assert "takes X, mu, got X" in refused("tables", "sample", "universal", "--X", "1")
 
 
+def test_a_sample_has_nan_for_combinations_that_are_no_islands():
+    asked = ("tables", "sample", "island4d", "--delta", "1.5", "--zeta-d", "2,20")
+    asked += ("--zeta-u", "20", "--hurst", "0.8")
+    columns = json.loads(run(*asked, "--outside", "nan", "--json"))["columns"]
+    assert columns["F_hat"] == [open_table("island4d").lookup(1.5, 2, 20, 0.8)[0], None]
+    assert "zeta_u must be above zeta_d (--outside nan" in refused(*asked)
+
+
 def test_a_sample_may_be_a_netcdf_file(tmp_path):
     """It was a table of text under that name."""
     path = tmp_path / "sample.nc"

@@ -264,6 +264,23 @@ def test_a_grid_has_what_each_lookup_has_and_nan_outside():
         table.to_dataset(**axes | {"hurst": [0.5, 0.5]})
 
 
+def test_a_grid_has_nan_where_zeta_u_is_not_above_zeta_d():
+    """It raised, so that no grid could span both magnifications."""
+    table = open_table("island4d")
+    axes = {"delta": 1.5, "zeta_d": [2.0, 3.0, 4.0], "zeta_u": [3.0, 20.0]}
+    grid = table.to_dataset(**axes, hurst=0.8)
+    is_island = np.less.outer(axes["zeta_d"], axes["zeta_u"])
+    for name in ("F_hat", "A_hat", "error"):
+        np.testing.assert_array_equal(np.isfinite(grid[name][0, ..., 0]), is_island)
+    found = table.lookup(1.5, 2.0, [1.0, 2.0, 20.0], 0.8, outside="nan")
+    assert np.isnan(found.F_hat).tolist() == [True, True, False]
+    assert found.F_hat[2] == grid.F_hat.sel(zeta_d=2.0, zeta_u=20.0).item()
+    assert np.isnan(table.lookup(1.5, 20.0, 2.0, 0.8, outside="nan")).all()
+    for outside in ("raise", "exact"):
+        with pytest.raises(OutOfRangeError, match="above zeta_d .outside='nan'"):
+            table.to_dataset(**axes, hurst=0.8, outside=outside)
+
+
 def test_a_grid_of_the_universal_table():
     table = open_table("universal")
     grid = table.to_dataset(X=[0.0, 2.0, 1e4], mu=[0.1, 10.0])
