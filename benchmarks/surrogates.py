@@ -21,6 +21,7 @@ from typing import Any
 
 import click
 import numpy as np
+from matplotlib.transforms import Bbox
 from scipy.interpolate import NdBSpline, RegularGridInterpolator, make_interp_spline
 
 from generate import page
@@ -28,7 +29,7 @@ from generate.files import ROOT
 from mbma_tables import open_table
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
-from mbma_tables.common.files import shipped_file
+from mbma_tables.common.files import shipped_file, write_file
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.tables.configuration import load
 from mbma_tables.tables.island4d import Island4dModel, band_fields
@@ -49,6 +50,14 @@ PROCESS_POINTS = 1500
 KRIGING_POINTS = 300
 RIDGE_POINTS = 20_000
 OWN = "mbma_tables"
+FIGURE = "docs/figures/surrogates.svg"
+MARKER = 6.0  # size of a marker of the figure, points
+POINTS_PER_INCH = 72
+# of labels from their markers, points: the nearest that is free is taken
+OFFSETS = sorted(
+    ((side * right, up) for side in (1, -1) for right in (5, 9) for up in range(-30, 31)),
+    key=lambda offset: (abs(offset[1] + 2) + 4 * abs(offset[0]), offset[0] < 0),
+)
 
 
 @dataclasses.dataclass
@@ -497,28 +506,71 @@ def drawn(rows: list[dict[str, Any]]) -> Any:
             "o" if mine else "s",
             color="C3" if mine else "C0",
         )
-        axis.annotate(
-            row["name"],
-            (time_of_all, row["largest"]),
-            xytext=(5, 3),
-            textcoords="offset points",
-            fontsize=7,
-        )
     axis.set_xlabel("time of a million lookups [s]")
     axis.set_ylabel("largest relative error on held-out islands")
     axis.margins(x=0.25, y=0.1)
+    places = [(MILLION * row["many"], row["largest"]) for row in rows]
+    label(figure, axis, [row["name"] for row in rows], places)
     return figure
 
 
+def label(
+    figure: Any, axis: Any, names: list[str], places: list[tuple[float, float]]
+) -> None:
+    """Write names beside markers, each where it covers no other name and no marker."""
+    figure.draw_without_rendering()
+    centres = axis.transData.transform(places)
+    marker = MARKER * figure.dpi / POINTS_PER_INCH
+    taken = [Bbox.from_bounds(*(c - marker / 2), marker, marker) for c in centres]
+    for name, place in zip(names, places, strict=True):
+        text = axis.annotate(name, place, (0, 0), textcoords="offset points", fontsize=7)
+        text.set_in_layout(False)  # so that markers stay where they are
+        for offset in OFFSETS:
+            text.set_position(offset)
+            text.set_horizontalalignment("left" if offset[0] > 0 else "right")
+            box = text.get_window_extent()
+            is_inside = Bbox.union([box, axis.bbox]).bounds == axis.bbox.bounds
+            if is_inside and not box.count_overlaps(taken):
+                break
+        else:
+            raise click.ClickException(f"the figure has no place for {name!r}")
+        taken.append(box)
+
+
+def measured_before() -> list[dict[str, Any]]:
+    """What the figure shows, from the table of the page."""
+    text = (ROOT / "docs/surrogates.md").read_text(encoding="utf-8")
+    blocks = {match[2]: match[0] for match in page.MARKED.finditer(text)}
+    lines = [line for line in blocks["surrogates"].splitlines() if line.startswith("|")]
+    header, _, *cells = (line.strip("| ").split(" | ") for line in lines)
+    rows = [dict(zip(header, row, strict=True)) for row in cells]
+    return [
+        {
+            "name": row["surrogate"],
+            "package": row["package"],
+            "largest": float(row["largest error"]),
+            "many": page.seconds(row["a million"]) / MILLION,
+        }
+        for row in rows
+    ]
+
+
 @click.command()
+@click.option(
+    "--redraw", is_flag=True, help="Only draw the figure anew, from the page's table."
+)
 @click.option(
     "--out",
     type=click.Path(path_type=pathlib.Path),
     default=ROOT,
     help="Folder below which docs/surrogates.md and its figure are written.",
 )
-def surrogates(out: pathlib.Path) -> None:
+def surrogates(redraw: bool, out: pathlib.Path) -> None:
     """Measure surrogates of contact islands, and write docs/surrogates.md (ten minutes)."""
+    if redraw:
+        write_file(out / FIGURE, page.svg(drawn(measured_before())), make_folders=True)
+        click.echo(out / FIGURE)
+        return
     start = time.perf_counter()
     held_out = random_islands(HELD_OUT, SEED + 1)
     rows = []
@@ -531,7 +583,7 @@ def surrogates(out: pathlib.Path) -> None:
     missing = [name for name in ("interpn", "smt") if not importlib.util.find_spec(name)]
     note = f"Not installed, and left out: {', '.join(missing)}.\n\n" if missing else ""
     parts = {"surrogates": note + text_of(rows), "bounds": bounds()}
-    figures = {"docs/figures/surrogates.svg": drawn(rows)}
+    figures = {FIGURE: drawn(rows)}
     for path in page.write("surrogates", parts, figures, out):
         click.echo(path)
     click.echo(f"{time.perf_counter() - start:.0f} s")

@@ -54,6 +54,7 @@ Picture: TypeAlias = "bytes | Figure"  # the content of a file, or what it is dr
 Measured: TypeAlias = tuple[dict[str, str], dict[str, Picture]]  # blocks and files
 # of a table: a tuple fills a format of several fields
 Cell: TypeAlias = str | float | tuple[str | float, ...] | None
+UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # of time, longest first
 MARKED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -140,11 +141,14 @@ def percent(value: float) -> str:
 
 def duration(seconds: float) -> str:
     """A time to two digits, in its unit."""
-    longest_first = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
-    fitting = (unit for unit, size in longest_first.items() if seconds >= size)
-    unit = next(fitting, "ns")
-    size = longest_first.get(unit, 1e-9)
-    return f"{float(f'{seconds / size:.2g}'):g} {unit}"
+    unit = next((unit for unit, size in UNITS.items() if seconds >= size), "ns")
+    return f"{float(f'{seconds / UNITS[unit]:.2g}'):g} {unit}"
+
+
+def seconds(text: str) -> float:
+    """A time from its text by `duration`."""
+    number, unit = text.split()
+    return float(number) * UNITS[unit]
 
 
 def spans(edges: Sequence[float], form: str = "{:g}-{:g}%") -> str:

@@ -7,10 +7,13 @@ import pytest
 
 from benchmarks import surrogates
 from benchmarks.surrogates import (
+    FIGURE,
     HELD_OUT,
     Surrogate,
+    drawn,
     errors,
     grid_interpolator,
+    measured_before,
     of_form,
     of_points,
     outside,
@@ -19,6 +22,7 @@ from benchmarks.surrogates import (
     spline,
     text_of,
 )
+from generate import page
 from generate.files import ROOT
 from mbma_tables import greenwood_tripp, open_table
 
@@ -85,3 +89,33 @@ def test_the_page_is_written_by_the_command():
         assert name in blocks[0][1]
     # no error of a million is above its bound
     assert blocks[1][1].strip().splitlines()[-1].endswith("| 0 |")
+
+
+def test_labels_of_the_figure_cover_nothing():
+    """Each began beside its marker, seven of them across one another."""
+    rows = measured_before()
+    figure = drawn(rows)
+    figure.draw_without_rendering()
+    (axis,) = figure.axes
+    assert sorted(text.get_text() for text in axis.texts) == sorted(
+        row["name"] for row in rows
+    )
+    boxes = [text.get_window_extent() for text in axis.texts]
+    markers = [line.get_window_extent() for line in axis.lines]
+    for number, box in enumerate(boxes):
+        assert not box.count_overlaps(boxes[:number])
+        assert not box.count_overlaps(markers)
+        assert axis.bbox.x0 < box.x0 < box.x1 < axis.bbox.x1
+        assert axis.bbox.y0 < box.y0 < box.y1 < axis.bbox.y1
+
+
+def test_the_figure_shows_the_table_of_the_page():
+    picture = (ROOT / FIGURE).read_text(encoding="utf-8")
+    for row in measured_before():
+        # numbers of a picture are rounded
+        assert f"<!-- {row['name'].split(' 0.')[0]}" in picture, row["name"]
+
+
+@pytest.mark.parametrize("time", [1.8e-6, 5.5e-1, 3.2e-9, 140.0])
+def test_times_of_a_page_are_read_again(time):
+    assert page.seconds(page.duration(time)) == pytest.approx(time, rel=1e-12)
