@@ -277,7 +277,7 @@ def test_a_grid_has_nan_where_zeta_u_is_not_above_zeta_d():
     assert found.F_hat[2] == grid.F_hat.sel(zeta_d=2.0, zeta_u=20.0).item()
     assert np.isnan(table.lookup(1.5, 20.0, 2.0, 0.8, outside="nan")).all()
     for outside in ("raise", "exact"):
-        with pytest.raises(OutOfRangeError, match="above zeta_d .outside='nan'"):
+        with pytest.raises(OutOfRangeError, match=r"above zeta_d .outside='nan'"):
             table.to_dataset(**axes, hurst=0.8, outside=outside)
 
 
