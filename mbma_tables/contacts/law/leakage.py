@@ -89,9 +89,11 @@ class LeakageLaw:
         # what percolates in the elastic contact is not known to block the yielded one
         theory = self.law.setup.theory_of(self.law.setup.bodies)
         blocked = np.flatnonzero(found == 0)
-        if theory.elastic is not theory and not getattr(
+        yields_elsewhere = theory.elastic is not theory and not getattr(
             self.law.gaps, "of_yielded_gaps", False
-        ):
+        )
+        # theories are asked at one gap at least
+        if yields_elsewhere and blocked.size:
             u = self.law.both_separations("separation", flat[blocked])[1]
             yields = yields_noticeably(theory, self.law.surface, u)
             found[blocked] = unknown_where_blocked(found[blocked], yields)
