@@ -335,9 +335,8 @@ class ForceLaw:
 
     def approach(self, force: Any) -> Numbers:
         """Approach at a force."""
-        left: FloatArray = self.law.at_pressure(
-            forces(force, self.body, self.law.units.length)
-        ).mean_separation
+        wanted = forces(force, self.body, self.law.units.length)
+        left = self.law.at_pressure(wanted).mean_separation
         return self.law.h_max + self.first - left
 
     def _left(self, approach: ArrayLike | str) -> FloatArray:

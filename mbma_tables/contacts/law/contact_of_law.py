@@ -6,8 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from mbma_tables.common.arguments import is_labelled
 from mbma_tables.contacts.question import Question
 from mbma_tables.contacts.result import Contact
+
+#: quantities beside those of the law's polynomials
+OF_LAWS = ("error", "energy", "unloading_stiffness")
 
 
 class LawContact(Contact):
@@ -19,7 +23,7 @@ class LawContact(Contact):
     def of(cls, law: Any, question: Question) -> LawContact:
         """The contact of a law at a gap, a pressure or an area."""
         if question.name == "pressure":
-            values = law.point_of(question)._asdict()
+            values = law.values_at_pressures(question)
         else:
             gaps = question
             if not question.is_gap:
@@ -28,16 +32,19 @@ class LawContact(Contact):
             names = ("pressure", "area", "stiffness")
             values = dict(zip(names, law.values_of(names, gaps), strict=True))
             values |= {"separation": d[()], "mean_separation": u[()]}
-        values["error"] = law.error + 0.0 * values["area"]
         contact = cls(law.setup, values)
-        contact.describe({})
         contact._law = law
+        if is_labelled(question.value):
+            contact.describe({})
         return contact
 
     def quantity(self, name: str) -> Any:
-        """A quantity by its name; energy and unloading stiffness are the law's."""
-        if name in ("energy", "unloading_stiffness") and name not in self._values:
-            value = getattr(self._law, name)(separation=self.separation)
+        """A quantity by its name; error, energy and unloading stiffness are the law's."""
+        if name in OF_LAWS and name not in self._values:
+            if name == "error":
+                value = self._law.error + 0.0 * self.area
+            else:
+                value = getattr(self._law, name)(separation=self.separation)
             self._values[name] = self._described(name, value)
         return super().quantity(name)
 

@@ -71,23 +71,6 @@ SCAN = 49  # gaps at which a law's stiffness is looked at for its maximum
 DIGITS = 10.0  # times a law's error: smaller decreases of stiffness are errors of the polynomials
 
 
-class LawPoint(
-    collections.namedtuple(
-        "LawPoint", ("separation", "mean_separation", "area", "stiffness", "pressure")
-    )
-):
-    """Results of a law at given pressures: separation d, mean separation u, A/A0, -dF/du and F/A0, of their shape."""
-
-    units = Units()  #: the law's
-
-    def __repr__(self) -> str:
-        texts = [
-            f"{name} {shown(value, unit_of(name, self.units))}"
-            for name, value in self._asdict().items()
-        ]
-        return f"LawPoint({', '.join(texts)})"
-
-
 def _refuse_energy_of_yielded(*gaps: Any, **named: Any) -> Numbers:
     """In place of the method `energy` of laws with a hardness."""
     raise InputError(f"energy needs an elastic contact: {ENERGY_OF_YIELDED}")
@@ -344,22 +327,26 @@ class ContactLaw(Law, LawQuantities, Displayed):
         d: Numbers = self.separations_of(question)
         return d
 
-    def at_pressure(self, pressure: ArrayLike | str) -> LawPoint:
-        """Separations, area and stiffness -dF/du where F/A0 is `pressure`, on the branch of first contact.
+    def at_pressure(self, pressure: ArrayLike | str) -> LawContact:
+        """The contact where F/A0 is `pressure`, on the branch of first contact; as `at`.
 
         With a hardness each of several pressures is reached by first loading from no contact,
         also where they fall: a law does not know of a larger pressure before.
         """
-        return self.point_of(self._asked(pressure=pressure))
+        return self.at(pressure=pressure)
 
-    def point_of(self, question: Question) -> LawPoint:
-        """Results where a pressure is given."""
+    def values_at_pressures(self, question: Question) -> dict[str, Numbers]:
+        """Separations, area and stiffness -dF/du where pressures are given, in one pass."""
         d, area, stiffness = self._inverse(question, 3)
         mean = d + self.h_max
         mean *= 0.5
-        point = LawPoint(d, mean, area, stiffness, question.value[()])
-        point.units = self.units
-        return point
+        return {
+            "separation": d,
+            "mean_separation": mean,
+            "area": area,
+            "stiffness": stiffness,
+            "pressure": question.value[()],
+        }
 
     def _inverse(self, question: Question, count: int = 1) -> Any:
         """Gaps of pressures or areas, and with a `count` of 3 area and -dF/du there."""

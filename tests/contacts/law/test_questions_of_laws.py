@@ -11,11 +11,13 @@ import xarray as xr
 from mbma_tables import (
     Bodies,
     InputError,
+    Joint,
     OutOfRangeError,
     Surface,
     contact,
     contact_law,
 )
+from mbma_tables.contacts.result import Contact
 from mbma_tables.theories import Mbma, Theory
 
 FACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
@@ -49,6 +51,26 @@ METHODS_OF_CONTACTS = METHODS[:3] + METHODS[4:9]
 @pytest.fixture(scope="module", params=["mbma", "calibrated", "persson"])
 def law(request):
     return contact_law(FACE, BODIES, theory=request.param)
+
+
+def test_whatever_is_asked_answers_with_a_contact(law):
+    """A law answered `at_pressure` with five numbers alone."""
+    theory = law.theory
+    joint = Joint(FACE, bodies=BODIES, theory=theory)
+    answers = [
+        contact(FACE, BODIES, pressure=0.008, theory=theory),
+        law.at(pressure=0.008),
+        law.at_pressure(0.008),
+        joint.at(pressure=0.008),
+        joint.at_pressure(0.008),
+    ]
+    known = answers[0].to_dataset()
+    for answer in answers:
+        assert isinstance(answer, Contact)
+        found = answer.to_dataset()
+        assert set(found) >= set(known) > {"pressure", "solid_conductance", "valid"}
+        for name in ("mean_separation", "area", "stiffness", "energy"):
+            assert float(found[name]) == pytest.approx(float(known[name]), rel=1e-6)
 
 
 def forms(name, value):
