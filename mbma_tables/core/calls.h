@@ -10,6 +10,7 @@
 
 #include "elementary.h"
 #include "mbma.h"
+#include "spectra.h"
 
 enum { MOST_ARGUMENTS = 24 };
 
@@ -766,6 +767,107 @@ static bool do_spectrum_law_separation(const argument *a, long long *answer) {
     return true;
 }
 
+/* ---- spectra.c ---- */
+
+/* The inner integral is three arguments: polynomials and slopes of each cell, and numbers. */
+enum { INNER_POLYNOMIALS, INNER_SLOPES, INNER_NUMBERS, INNER_ARGUMENTS };
+#define INNER "D D D3 "
+
+/* The third of them. */
+typedef struct {
+    double first, rate, narrowness;
+} inner_numbers;
+
+static bool is_inner(const argument *inner) {
+    const size_t count = inner[INNER_POLYNOMIALS].count;
+    return count > 0 && count % MBMA_INNER_TERMS == 0 &&
+           count <= MBMA_INNER_TERMS * MBMA_MOST_INNER_CELLS &&
+           inner[INNER_SLOPES].count == count;
+}
+
+static mbma_inner inner_of(const argument *inner) {
+    const inner_numbers *const numbers = inner[INNER_NUMBERS].items;
+    return (mbma_inner){
+        .cells = inner[INNER_POLYNOMIALS].count / MBMA_INNER_TERMS,
+        .first = numbers->first,
+        .rate = numbers->rate,
+        .narrowness = numbers->narrowness,
+        .polynomials = inner[INNER_POLYNOMIALS].items,
+        .slopes = inner[INNER_SLOPES].items,
+    };
+}
+
+static bool do_words_of_spectrum_numbers(const argument *a, long long *answer) {
+    (void)a;
+    *answer = WORDS(mbma_spectrum_numbers);
+    return true;
+}
+
+static bool do_spectra_of(const argument *a, long long *answer) {
+    enum { ALPHA, H_MAX, LAWS, CONSTANTS, INNER_AT };
+    enum { WAVES = INNER_AT + INNER_ARGUMENTS, NUMBERS };
+    const size_t surfaces = a[ALPHA].count;
+    if (surfaces == 0 || !is_inner(&a[INNER_AT]))
+        return false;
+    const size_t parts = a[LAWS].count / surfaces / MBMA_PART_NUMBERS;
+    const size_t most = a[WAVES].count / surfaces / 3;
+    if (a[LAWS].count != surfaces * parts * MBMA_PART_NUMBERS || parts > MBMA_MOST_PARTS ||
+        a[WAVES].count != surfaces * most * 3 ||
+        a[NUMBERS].count != surfaces * WORDS(mbma_spectrum_numbers))
+        return false;
+    const mbma_inner inner = inner_of(&a[INNER_AT]);
+    *answer = (long long)mbma_spectra_of(surfaces, parts, a[LAWS].items, a[ALPHA].items,
+                                         a[H_MAX].items, a[CONSTANTS].items, &inner, most,
+                                         a[WAVES].items, a[NUMBERS].items);
+    return true;
+}
+
+/* First in both calls: waves and numbers of surfaces, and t0 of areas. */
+enum { SPECTRA_WAVES, SPECTRA_NUMBERS, SPECTRA_T0, SPECTRA_INNER };
+enum { SPECTRA_ARGUMENTS = SPECTRA_INNER + INNER_ARGUMENTS };
+#define SPECTRA "D D d " INNER
+
+static bool are_spectra(const argument *a) {
+    const size_t surfaces = a[SPECTRA_NUMBERS].count / WORDS(mbma_spectrum_numbers);
+    return surfaces > 0 && is_inner(&a[SPECTRA_INNER]) &&
+           a[SPECTRA_NUMBERS].count == surfaces * WORDS(mbma_spectrum_numbers) &&
+           a[SPECTRA_WAVES].count % (3 * MBMA_WAVE_CHUNK * surfaces) == 0;
+}
+
+static mbma_spectra spectra_of(const argument *a) {
+    const size_t surfaces = a[SPECTRA_NUMBERS].count / WORDS(mbma_spectrum_numbers);
+    return (mbma_spectra){
+        .count = surfaces,
+        .most = a[SPECTRA_WAVES].count / (3 * surfaces),
+        .waves = a[SPECTRA_WAVES].items,
+        .numbers = a[SPECTRA_NUMBERS].items,
+        .area_t0 = a[SPECTRA_T0].real,
+    };
+}
+
+static bool do_spectra_contact(const argument *a, long long *answer) {
+    enum { OWNER = SPECTRA_ARGUMENTS, SEPARATION, FORCE, AREA, STIFFNESS };
+    if (!are_spectra(a))
+        return false;
+    const mbma_spectra spectra = spectra_of(a);
+    const mbma_inner inner = inner_of(&a[SPECTRA_INNER]);
+    *answer = (long long)mbma_spectra_contact(&spectra, &inner, a[OWNER].count, a[OWNER].items,
+                                              a[SEPARATION].items, a[FORCE].items,
+                                              a[AREA].items, a[STIFFNESS].items);
+    return true;
+}
+
+static bool do_spectra_separation(const argument *a, long long *answer) {
+    enum { OWNER = SPECTRA_ARGUMENTS, FORCE, SEPARATION };
+    if (!are_spectra(a))
+        return false;
+    const mbma_spectra spectra = spectra_of(a);
+    const mbma_inner inner = inner_of(&a[SPECTRA_INNER]);
+    *answer = (long long)mbma_spectra_separation(&spectra, &inner, a[OWNER].count, a[OWNER].items,
+                                                 a[FORCE].items, a[SEPARATION].items);
+    return true;
+}
+
 /* ---- all functions ---- */
 
 /* Names of the functions `do_...`, which return whether the sizes and numbers of their arguments
@@ -809,6 +911,10 @@ static bool do_spectrum_law_separation(const argument *a, long long *answer) {
     FN(spectrum_waves, "Dn Dn wm wm wm w4") \
     FN(spectrum_law_of, "Dn Dn Dn D10 w3n w") \
     FN(spectrum_law_contact, "D Dn wn wn wn") \
-    FN(spectrum_law_separation, "D Dn i wn wn")
+    FN(spectrum_law_separation, "D Dn i wn wn") \
+    FN(words_of_spectrum_numbers, "") \
+    FN(spectra_of, "Dn Dn D D7 " INNER "w w") \
+    FN(spectra_contact, SPECTRA "Ln Dn wn wn wn") \
+    FN(spectra_separation, SPECTRA "Ln Dn wn")
 
 #endif

@@ -5,11 +5,12 @@ from __future__ import annotations
 import abc
 import dataclasses
 import functools
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from mbma_tables.common.arguments import broadcast_shape, is_labelled
 from mbma_tables.common.display import Displayed, Variable, shown
@@ -88,6 +89,24 @@ class AnySurface(Displayed, abc.ABC):
     def with_numbers(self, *numbers: Any) -> Self:
         """The same kind of surface with other `parameters`, in their order."""
         return self
+
+    def taken_from(
+        self, batch: AnySurface, shape: tuple[int, ...], place: NDArray[np.intp]
+    ) -> Self:
+        """The same surface, with a note of the batch, broadcast to `shape`, whose entries it has.
+
+        What a theory prepared for the batch then serves for its entries.
+        """
+        number = np.arange(math.prod(batch.shape)).reshape(batch.shape)
+        rows = np.broadcast_to(number, shape).ravel()[place]
+        whole, of_whole = batch.origin
+        vars(self)["origin"] = whole, rows if of_whole is None else of_whole[rows]
+        return self
+
+    @functools.cached_property
+    def origin(self) -> tuple[AnySurface, NDArray[np.intp] | None]:
+        """The batch that it was taken from, and which surfaces of it these are; itself."""
+        return self, None
 
     @abc.abstractmethod
     def power_spectrum(self, q: ArrayLike) -> Any:

@@ -480,7 +480,7 @@ def select(surface: AnySurface, shape: tuple[int, ...], place: Indices) -> AnySu
         np.broadcast_to(getattr(surface, name), shape).ravel()[chosen]
         for name in surface.parameters
     ]
-    return surface.with_numbers(*numbers)
+    return surface.with_numbers(*numbers).taken_from(surface, shape, chosen)
 
 
 def unfinished(failed: NDArray[np.bool_], what: str) -> ConvergenceError:

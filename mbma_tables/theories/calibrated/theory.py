@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
-import math
-from collections.abc import Iterator, Mapping
+import weakref
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mbma_tables.common.arguments import FloatArray, grouped, require, spread
+from mbma_tables.common.arguments import FloatArray, require, spread
 from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.spectral import PRESSED
@@ -19,12 +21,11 @@ from mbma_tables.theories.base import Theory, TheoryAnswer, unfinished
 from mbma_tables.theories.calibrated import table as calibrated_table
 from mbma_tables.theories.calibrated.formulas import (
     KEPT,
-    Law,
     force_at_area,
     light_factor,
-    self_affine_law,
 )
 from mbma_tables.theories.calibrated.formulas import area as law_area
+from mbma_tables.theories.calibrated.spectra import Spectra, self_affine_laws
 from mbma_tables.theories.evidence import NAME, shipped_checksum, shipped_deviations
 from mbma_tables.theories.inversion import Curve
 
@@ -65,11 +66,11 @@ def _error(stated: Any, nearer: float, share: FloatArray) -> FloatArray:
 
 
 class Batch:
-    """Surfaces prepared for the table, for about so many entries."""
+    """Surfaces prepared for about so many entries: for the table, and by their spectra outside of it."""
 
     def __init__(self, surface: Surface, entries: int) -> None:
-        names = ("hurst", "zeta_1", "h_max", "h_rms", "rms_gradient")
-        hurst, zeta_1, h_max, h_rms, gradient = (
+        names = ("hurst", "zeta_1", "h_max", "h_rms", "rms_gradient", "alpha")
+        hurst, zeta_1, h_max, h_rms, gradient, alpha = (
             np.asarray(getattr(surface, name), float).ravel() for name in names
         )
         table, self.shape, self.h_rms, self.gradient = (
@@ -78,12 +79,28 @@ class Batch:
             h_rms,
             gradient,
         )
-        self.columns = np.array([hurst, np.log(zeta_1), h_max / h_rms])
-        self.covered = table.covers(*self.columns[:2]) & (
-            self.columns[2] <= np.exp(table.covered[2, 1])
+        self.rows = np.arange(h_rms.size)
+        columns = np.array([hurst, np.log(zeta_1), h_max / h_rms])
+        self.covered = table.covers(*columns[:2]) & (
+            columns[2] <= np.exp(table.covered[2, 1])
         )
         self.whole = bool(self.covered.all())
-        self.contacts, self.separations = table.prepared(self.columns, entries)
+        self.contacts, self.separations = table.prepared(columns, entries)
+        if not self.whole:
+            rows = np.flatnonzero(~self.covered)
+            self.number = np.cumsum(~self.covered) - 1
+            self.spectra = Spectra(
+                self_affine_laws(hurst[rows], zeta_1[rows]),
+                alpha[rows],
+                columns[2, rows],
+            )
+
+    def part(self, rows: NDArray[np.intp], shape: tuple[int, ...]) -> Batch:
+        """Some of the surfaces, which share what was prepared for all."""
+        some = copy.copy(self)
+        some.shape = shape
+        some.rows = rows
+        return some
 
     def placed(self, value: FloatArray) -> tuple[FloatArray, Any, tuple[int, ...], Any]:
         """Numbers that broadcast with the surfaces, flat; the surface of each, as a number and to index; the shape."""
@@ -95,18 +112,11 @@ class Batch:
                 slice(None),
             )
         shape = np.broadcast_shapes(value.shape, self.shape)
-        number = np.arange(self.h_rms.size).reshape(self.shape)
+        number = self.rows.reshape(self.shape)
         flat, owner = (
             np.ascontiguousarray(spread(each, shape)).ravel() for each in (value, number)
         )
         return flat, owner, shape, owner
-
-    def outside(self, owner: Any, asked: Any = True) -> Iterator[tuple[Law, Any]]:
-        """Laws of the surfaces outside of the table, with their entries."""
-        chosen = np.flatnonzero(~self.covered[owner] & asked)
-        for row, mine in grouped(owner[chosen]):
-            hurst, log_zeta, heights = self.columns[:, row].tolist()
-            yield self_affine_law(hurst, math.exp(log_zeta), heights), chosen[mine]
 
     def contact(self, u: FloatArray) -> FloatArray:
         """Force, area and stiffness at mean separations [length]."""
@@ -118,14 +128,35 @@ class Batch:
         gradient = self.gradient[own]
         h_rms = self.h_rms[own]
         x = flat / h_rms
-        out = self.contacts((owner, x))
-        if not self.whole:
-            for law, mine in self.outside(owner):
-                out[:, mine] = law.contact(x[mine])
+        if self.whole:
+            out = self.contacts((owner, x))
+        else:
+            out = np.empty((3, x.size))
+            for some, contacts, owners in self.routes(owner, True):
+                out[:, some] = contacts((owners, x[some]))
         out[0] *= gradient
         out[2] *= gradient
         out[2] /= h_rms
         return out.reshape(3, *shape)
+
+    def separation(self, owner: Any, loads: FloatArray) -> FloatArray:
+        """Mean separations over h_rms at forces over A0 E* g; infinite without a force."""
+        u = np.full(loads.size, np.inf)
+        for some, separations, owners in self.routes(owner, False, loads > 0):
+            u[some] = separations((owners, loads[some]))[0]
+        return u
+
+    def routes(
+        self, owner: Any, at_gaps: bool, asked: Any = True
+    ) -> Iterator[tuple[Any, Callable[..., FloatArray], Any]]:
+        """Entries with their loop of the core and its owners: by the table, and outside of it."""
+        covered = self.covered[owner]
+        some = np.flatnonzero(covered & asked)
+        yield some, self.contacts if at_gaps else self.separations, owner[some]
+        if not self.whole:
+            some = np.flatnonzero(~covered & asked)
+            loop = self.spectra.contacts if at_gaps else self.spectra.separations
+            yield some, loop, self.number[owner[some]]
 
 
 @shared(KEPT)
@@ -133,12 +164,21 @@ def _single(surface: Surface) -> Batch:
     return Batch(surface, MANY)
 
 
+# batches with surfaces outside of the table, whose wavenumbers are found once
+_prepared: weakref.WeakKeyDictionary[AnySurface, Batch] = weakref.WeakKeyDictionary()
+
+
 def _bound(surface: Surface, value: FloatArray) -> Batch:
-    return (
-        Batch(surface, max(np.size(value), surface.hurst.size))
-        if surface.shape
-        else _single(surface)
-    )
+    if not surface.shape:
+        return _single(surface)
+    whole, rows = surface.origin
+    batch = _prepared.get(whole)
+    if batch is not None:
+        return batch if rows is None else batch.part(rows, surface.shape)
+    batch = Batch(surface, max(np.size(value), surface.hurst.size))
+    if not batch.whole and rows is None:
+        _prepared[surface] = batch
+    return batch
 
 
 def _spread(surface: MeasuredSurface, quantity: str, area: FloatArray) -> FloatArray:
@@ -254,12 +294,7 @@ class Calibrated(Theory):
         else:
             loads = flat / batch.gradient[own]
         # zero load is last contact
-        u = np.full(loads.size, np.inf)
-        loaded = loads > 0
-        some = np.flatnonzero(batch.covered[owner] & loaded)
-        u[some] = batch.separations((owner[some], loads[some]))[0]
-        for law, mine in () if batch.whole else batch.outside(owner, loaded):
-            u[mine] = law.separation(np.maximum(loads[mine], 1e-300))
+        u = batch.separation(owner, loads)
         require(
             quantity,
             np.broadcast_to(wanted, shape),

@@ -1,0 +1,469 @@
+/* Sums over wavenumbers of many spectra; `spectra.h` has what they are, `spectrum_laws.c` the
+ * theory.
+ */
+#include "spectra.h"
+#include "elementary.h"
+
+enum { TERMS = MBMA_INNER_TERMS, MOST_CELLS = MBMA_MOST_INNER_CELLS, MOST_STEPS = 60, LANES = 8, NODES = 8, CHUNK = MBMA_WAVE_CHUNK };
+
+#define HEAVIEST 2.95         /* ln F from which u is below 1e-317 */
+#define CLOSE 1e-8            /* of ln F: the next error would be about the square of this one */
+#define NO_FORCE -1e300       /* ln F */
+#define FARTHEST 1e80         /* u at which there is no force */
+#define FINEST (1.0 / 256.0)  /* panel of ln g at the shortest waves, which carry heavy loads */
+#define WIDEST 0.8 /* panel of ln g */
+#define BEGINNING 2e-18       /* part of a spectrum's width in which g rises to 1e-9 */
+#define DEEP 0.05             /* g, below which few nodes suffice where shares of u are small */
+#define MOST_CHANGE 6.0       /* of ln of the spectrum in a panel */
+
+/* ---- wavenumbers ---- */
+
+/* Gauss's rules of 2, 4, 6 and 8 nodes on [-1, 1], nodes and weights; nodes beyond have no weight. */
+typedef struct {
+    int count;
+    double node[NODES], weight[NODES];
+} gauss_rule;
+
+static const gauss_rule RULES[] = {
+    {2, {-0.5773502691896257, 0.5773502691896257}, {1.0, 1.0}},
+    {4,
+     {-0.8611363115940526, -0.33998104358485626, 0.33998104358485626, 0.8611363115940526},
+     {0.34785484513745385, 0.6521451548625461, 0.6521451548625461, 0.34785484513745385}},
+    {6,
+     {-0.932469514203152, -0.6612093864662645, -0.2386191860831969, 0.2386191860831969,
+      0.6612093864662645, 0.932469514203152},
+     {0.1713244923791704, 0.3607615730481386, 0.467913934572691, 0.467913934572691,
+      0.3607615730481386, 0.1713244923791704}},
+    {8,
+     {-0.9602898564975363, -0.7966664774136267, -0.525532409916329, -0.1834346424956498,
+      0.1834346424956498, 0.525532409916329, 0.7966664774136267, 0.9602898564975363},
+     {0.1012285362903763, 0.2223810344533745, 0.3137066458778873, 0.362683783378362,
+      0.362683783378362, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763}}};
+
+/* A part in ln(q/q0): where it begins and ends, C q^2 where it begins, and the power of C q^2. */
+typedef struct {
+    double start, end, content, power;
+} part;
+
+/* A spectrum as parts, and the places where one begins or ends. */
+typedef struct {
+    size_t count, edges;
+    part parts[MBMA_MOST_PARTS];
+    double edge[2 * MBMA_MOST_PARTS];
+} sum_of_parts;
+
+/* The parts between two of these places, from a place t on: C q^2 there and its power. */
+typedef struct {
+    size_t count;
+    double t, content[MBMA_MOST_PARTS], power[MBMA_MOST_PARTS], steepest;
+} local_parts;
+
+static local_parts parts_from(const sum_of_parts *s, size_t segment, double t) {
+    const double middle = 0.5 * (s->edge[segment] + s->edge[segment + 1]);
+    local_parts found;
+    found.count = 0;
+    found.t = t;
+    found.steepest = 0.0;
+    for (size_t k = 0; k < s->count; k++) {
+        const part *const own = &s->parts[k];
+        if (!(own->start < middle && middle < own->end))
+            continue;
+        found.content[found.count] = own->content * mbma_exp(own->power * (t - own->start));
+        found.power[found.count++] = own->power;
+        found.steepest = mbma_max(found.steepest, fabs(own->power));
+    }
+    return found;
+}
+
+/* (exp(x) - 1)/x */
+MBMA_INLINE double growth(double x) {
+    const double safe = fabs(x) > 1e-30 ? x : 1e-30;
+    return mbma_expm1(safe) / safe;
+}
+
+/* Integral of C q^(order + 1) dq over a width. */
+static double integral(const local_parts *here, int order, double width) {
+    double sum = 0.0;
+    for (size_t k = 0; k < here->count; k++)
+        sum += here->content[k] * growth((here->power[k] + order) * width);
+    return sum * width * mbma_exp(order * here->t);
+}
+
+static void insert(double x, size_t *count, double *sorted) {
+    size_t k = *count;
+    for (size_t other = 0; other < *count; other++)
+        if (fabs(sorted[other] - x) <= 1e-14 * (1.0 + fabs(x)))
+            return;
+    for (; k > 0 && sorted[k - 1] > x; k--)
+        sorted[k] = sorted[k - 1];
+    sorted[k] = x;
+    ++*count;
+}
+
+/* Parts of one surface; false where they are no spectrum. */
+static bool read_parts(size_t count, const double *laws, sum_of_parts *s) {
+    double q0 = INFINITY, largest = 0.0;
+    s->count = s->edges = 0;
+    for (size_t k = 0; k < count; k++) {
+        const double *const p = laws + MBMA_PART_NUMBERS * k;
+        if (!(p[0] > 0.0 && p[1] < INFINITY && p[2] >= 0.0 && p[2] < INFINITY && p[3] == p[3]))
+            return false;
+        if (p[2] > 0.0 && p[1] > p[0]) {
+            q0 = mbma_min(q0, p[0]);
+            largest = mbma_max(largest, p[2] * p[0] * p[0]);
+        }
+    }
+    for (size_t k = 0; k < count; k++) {
+        const double *const p = laws + MBMA_PART_NUMBERS * k;
+        if (!(p[2] > 0.0 && p[1] > p[0]))
+            continue;
+        const part own = {log(p[0] / q0), log(p[1] / q0), p[2] * p[0] * p[0] / largest,
+                          p[3] + 2.0};
+        s->parts[s->count++] = own;
+        insert(own.start, &s->edges, s->edge);
+        insert(own.end, &s->edges, s->edge);
+    }
+    return s->count > 0;
+}
+
+/* Moments 0, 2 and 4 but for a common factor. */
+static void moments_of(const sum_of_parts *s, double moments[3]) {
+    moments[0] = moments[1] = moments[2] = 0.0;
+    for (size_t k = 0; k + 1 < s->edges; k++) {
+        const local_parts here = parts_from(s, k, s->edge[k]);
+        for (int m = 0; m < 3; m++)
+            moments[m] += integral(&here, 2 * m, s->edge[k + 1] - s->edge[k]);
+    }
+}
+
+/* Width of the panel that begins here, where `before` of the squared gradient `whole` is below:
+ * ln g rises by 1 at most, by less towards the shortest waves, and nothing else changes much. */
+static double panel_width(const local_parts *here, double left, double before, double whole) {
+    if (before <= 0.0)
+        return BEGINNING * mbma_min(left, 1.0);
+    const double to_end = -0.5 * mbma_log(mbma_min(before / whole, 1.0));
+    const double rise = mbma_max(mbma_min(0.6 * to_end, WIDEST), FINEST);
+    const double wanted = before * mbma_expm1(2.0 * rise);
+    double rate = 0.0, bent = 0.0;
+    for (size_t k = 0; k < here->count; k++) {
+        rate += here->content[k];
+        bent += here->content[k] * (here->power[k] + 2.0);
+    }
+    const double straight = wanted / (rate * mbma_exp(2.0 * here->t));
+    bent = bent / rate * straight;
+    double width = straight * (bent > 1e-8 ? mbma_log1p(bent) / bent : 1.0);
+    width = mbma_min(mbma_min(width, MOST_CHANGE / (here->steepest + 1.0)), left);
+    while (integral(here, 2, width) > 1.5 * wanted)
+        width *= 0.6;
+    return left - width < 0.1 * width ? left : width;
+}
+
+/* The rule of a panel by the share of u that it has, and g at its end. */
+static const gauss_rule *rule_for(double share, double g) {
+    if (g > DEEP || share > 1e-3)
+        return &RULES[3];
+    return &RULES[share > 1e-5 ? 2 : share > 1e-7 ? 1 : 0];
+}
+
+/* Sums over wavenumbers on the way. */
+typedef struct {
+    double mean, inverse, variance, shares, shares_log_g;
+} wave_sums;
+
+/* Where wavenumbers are written to. */
+typedef struct {
+    const mbma_inner *inner;
+    size_t count, most;
+    double *place, *fall, *share;
+    wave_sums sums;
+} wave_list;
+
+/* Wavenumbers of a panel; `before` of the squared gradient is below it, and all is moments[1]. */
+static void add_panel(const local_parts *here, double width, double before,
+                      const double moments[3], const gauss_rule *rule, wave_list *list) {
+    const double unit = 0.25 / sqrt(moments[0] * moments[1]), x0 = mbma_exp(here->t);
+    /* g rises like the root of t */
+    const double low = sqrt(here->t), high = sqrt(here->t + width);
+    double rise[NODES], variance[NODES], below[NODES], content[NODES] = {0.0}, risen[NODES] = {0.0};
+    double *const place = list->place + list->count, *const fall = list->fall + list->count;
+    double *const share = list->share + list->count;
+    for (int k = 0; k < NODES; k++) {
+        const double root = 0.5 * (low + high + (high - low) * rule->node[k]);
+        rise[k] = mbma_held(root * root - here->t, 0.0, width);
+        variance[k] = root * (high - low) * rule->weight[k];
+    }
+    for (size_t part = 0; part < here->count; part++) {
+        const double power = here->power[part], at_start = here->content[part];
+        for (int k = 0; k < NODES; k++) {
+            content[k] = mbma_fma(at_start, mbma_exp(power * rise[k]), content[k]);
+            risen[k] += at_start * rise[k] * growth((power + 2.0) * rise[k]);
+        }
+    }
+    for (int k = 0; k < NODES; k++) {
+        below[k] = mbma_fma(risen[k], x0 * x0, before) / moments[1];
+        variance[k] *= content[k];
+    }
+    for (int k = 0; k < rule->count; k++) {
+        const double x = x0 * mbma_exp(rise[k]), log_g = 0.5 * mbma_log(below[k]);
+        place[k] = (-log_g - list->inner->first) * list->inner->rate;
+        fall[k] = mbma_max(1.0 / below[k] - 1.0, 0.0);
+        share[k] = x * variance[k] * unit / sqrt(below[k]);
+        list->sums.mean += variance[k] * x;
+        list->sums.inverse += variance[k] / x;
+        list->sums.variance += variance[k];
+        list->sums.shares += share[k];
+        list->sums.shares_log_g += share[k] * log_g;
+    }
+    list->count += (size_t)rule->count;
+}
+
+/* All wavenumbers of one surface; false where there is no room. */
+static bool fill_waves(const sum_of_parts *s, const double moments[3], wave_list *list) {
+    const double unit = sqrt(moments[0] * moments[1]);
+    double before = 0.0;
+    for (size_t segment = 0; segment + 1 < s->edges; segment++) {
+        const double end = s->edge[segment + 1];
+        double t = s->edge[segment];
+        while (t < end) {
+            const local_parts here = parts_from(s, segment, t);
+            if (here.count == 0)
+                break; /* a gap in the spectrum */
+            const double width = panel_width(&here, end - t, before, moments[1]);
+            const double after = before + integral(&here, 2, width), g = sqrt(after / moments[1]);
+            const double share = (g - sqrt(before / moments[1])) * moments[1] / unit * mbma_exp(-t);
+            const gauss_rule *const rule = rule_for(share, g);
+            if (!(after > before) || list->count + (size_t)rule->count > list->most)
+                return false;
+            add_panel(&here, width, before, moments, rule, list);
+            before = after;
+            t = width < end - t ? t + width : end;
+        }
+    }
+    /* what fills the last chunk has no share */
+    for (size_t k = list->count; k % CHUNK != 0; k++)
+        list->place[k] = list->fall[k] = list->share[k] = 0.0;
+    return list->count > 0;
+}
+
+/* ---- sums ---- */
+
+/* A surface that entries are computed of. */
+typedef struct {
+    const mbma_inner *inner;
+    const mbma_spectrum_numbers *numbers;
+    const double *place, *fall, *share;
+    size_t count;
+    double p[MOST_CELLS * TERMS];
+} own_sum;
+
+static void open_sum(own_sum *s, const mbma_inner *inner, const mbma_spectrum_numbers *numbers,
+                     const double *waves, size_t most) {
+    const double less = numbers->narrowness - inner->narrowness;
+    s->inner = inner;
+    s->numbers = numbers;
+    s->place = waves;
+    s->fall = waves + most;
+    s->share = waves + 2 * most;
+    s->count = numbers->count > 0.0 ? (size_t)numbers->count : 0;
+    for (size_t k = 0; k < inner->cells * TERMS; k++)
+        s->p[k] = mbma_fma(less, inner->slopes[k], inner->polynomials[k]);
+}
+
+/* The inner integral of some wavenumbers at places among the cells, and its derivative by these. */
+static void inner_integrals(const own_sum *s, const double *restrict place, double from,
+                            double *restrict value, double *restrict slope) {
+    const double *const restrict p = s->p;
+    const double last = (double)(s->inner->cells - 1);
+    int32_t word[CHUNK];
+    double t[CHUNK];
+    for (size_t k = 0; k < CHUNK; k++) {
+        const double at = mbma_min(from + place[k], last + 1.0);
+        const double cell = (double)(int32_t)mbma_held(at, 0.0, last);
+        word[k] = (int32_t)cell * TERMS;
+        t[k] = 2.0 * (at - cell) - 1.0;
+    }
+    for (size_t k = 0; k < CHUNK; k++) {
+        const double c0 = p[word[k]], c1 = p[word[k] + 1], c2 = p[word[k] + 2];
+        const double c3 = p[word[k] + 3], c4 = p[word[k] + 4], c5 = p[word[k] + 5];
+        slope[k] = 2.0 * mbma_horner(5.0 * c5, t[k], 4.0 * c4, 3.0 * c3, 2.0 * c2, c1);
+        value[k] = mbma_fma(mbma_horner(c5, t[k], c4, c3, c2, c1), t[k], c0);
+    }
+}
+
+/* Sums of eight lanes. */
+static double total_of(const double sum[LANES]) {
+    return ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]));
+}
+
+/* ln u of a surface without end, before the tail's factor, and its derivative by ln F. */
+static double log_u_of(const own_sum *s, double log_force, double *slope) {
+    const double square = 2.0 * mbma_exp(2.0 * log_force), rate = s->inner->rate;
+    double sum[LANES] = {0.0}, steep[LANES] = {0.0};
+    for (size_t begin = 0; begin < s->count; begin += CHUNK) {
+        const double *const fall = s->fall + begin, *const share = s->share + begin;
+        double value[CHUNK], by_place[CHUNK];
+        inner_integrals(s, s->place + begin, log_force * rate, value, by_place);
+        for (size_t k = 0; k < CHUNK; k++) {
+            const double factor = share[k] * mbma_exp(-square * fall[k]);
+            const double change = -2.0 * square * fall[k] * value[k];
+            by_place[k] = factor * mbma_fma(rate, by_place[k], change);
+            value[k] *= factor;
+        }
+        for (size_t k = 0; k < CHUNK; k += LANES)
+            for (size_t l = 0; l < LANES; l++) {
+                sum[l] += value[k + l];
+                steep[l] += by_place[k + l];
+            }
+    }
+    const double total = total_of(sum);
+    *slope = total_of(steep) / total - 2.0 * square;
+    return mbma_log(total) - square;
+}
+
+/* ln F at a mean separation before the tail's factor by Newton's method, and d ln u/d ln F. */
+static double log_force_at(const own_sum *s, double u, double *slope) {
+    const double log_u = mbma_log(u);
+    double low = NO_FORCE, high = HEAVIEST;
+    /* light loads, and those at which the sum ends like a Gaussian */
+    const double light = (s->numbers->light_end - u) / s->numbers->light;
+    double x = mbma_min(light, 0.5 * mbma_log(mbma_max(-0.5 * log_u, 0.01)));
+    x = mbma_min(x, HEAVIEST);
+    for (int step = 0; step < MOST_STEPS; step++) {
+        const double found = log_u_of(s, x, slope), miss = found - log_u;
+        /* u is nearly linear in ln F at light loads, ln u in F^2 at heavy ones */
+        const double change = u > 0.3 ? mbma_expm1(-miss) : -miss, following = x + change / *slope;
+        *(miss > 0.0 ? &low : &high) = x;
+        if (fabs(following - x) <= CLOSE)
+            return following;
+        const double middle = low > NO_FORCE ? 0.5 * (low + high) : x - 1.0;
+        x = following > low && following < high ? following : middle;
+    }
+    return x;
+}
+
+/* Decrease of ln F by the tail's factor. */
+static double tail_at(const own_sum *s, double u) { return s->numbers->tail * u * u * u; }
+
+/* Numbers of a surface from its wavenumbers; `end` is still to be found. */
+static mbma_spectrum_numbers numbers_of(const wave_list *list, double alpha, double h_max,
+                                        const mbma_law_constants *c) {
+    const mbma_inner *const inner = list->inner;
+    const wave_sums *const sums = &list->sums;
+    const double narrowness = sums->variance * sums->variance / (sums->mean * sums->inverse);
+    const double less = narrowness - inner->narrowness;
+    /* the inner integral is linear in ln y at its first place: in the middle of the cell, and by ln y */
+    const double value = mbma_fma(less, inner->slopes[0], inner->polynomials[0]);
+    const double slope = 2.0 * inner->rate * mbma_fma(less, inner->slopes[1], inner->polynomials[1]);
+    const double middle = inner->first + 0.5 / inner->rate;
+    const mbma_spectrum_numbers found = {
+        .count = (double)list->count,
+        .narrowness = narrowness,
+        .s0 = mbma_min(c->area_s0 + c->area_slope * log(alpha / 10.0), 1.0),
+        .tail = c->tail * (1.0 - narrowness),
+        .h_max = h_max,
+        .end = -INFINITY,
+        .light = mbma_max(-slope * sums->shares, 1e-300),
+        .light_end = sums->shares * (value - slope * middle) - slope * sums->shares_log_g,
+    };
+    return found;
+}
+
+size_t mbma_spectra_of(size_t n, size_t parts, const double *laws, const double *alpha,
+                       const double *h_max, const mbma_law_constants *constants,
+                       const mbma_inner *inner, size_t most, double *waves,
+                       mbma_spectrum_numbers *numbers) {
+    static const mbma_spectrum_numbers NONE = {0.0, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+    size_t bad = 0;
+    own_sum own;
+    for (size_t k = 0; k < n; k++) {
+        double *const first = waves + 3 * most * k, moments[3], slope;
+        wave_list list = {inner, 0, most, first, first + most, first + 2 * most, {0.0, 0.0, 0.0, 0.0, 0.0}};
+        sum_of_parts s;
+        bool good = read_parts(parts, laws + MBMA_PART_NUMBERS * parts * k, &s) && h_max[k] > 0.0 && alpha[k] > 0.0;
+        if (good) {
+            moments_of(&s, moments);
+            good = most % CHUNK == 0 && moments[0] > 0.0 && moments[1] > 0.0 && moments[1] < INFINITY && fill_waves(&s, moments, &list);
+        }
+        numbers[k] = good ? numbers_of(&list, alpha[k], h_max[k], constants) : NONE;
+        if (good && h_max[k] < FARTHEST) {
+            open_sum(&own, inner, &numbers[k], first, most);
+            numbers[k].end = log_force_at(&own, h_max[k], &slope) - tail_at(&own, h_max[k]);
+            good = numbers[k].end == numbers[k].end;
+        }
+        if (!good)
+            numbers[k] = NONE;
+        bad += !good;
+    }
+    return bad;
+}
+
+/* Whether the surface of an entry is another one than before; it is opened then. */
+static bool open_owner(const mbma_spectra *spectra, const mbma_inner *inner, int64_t owner,
+                       int64_t *opened, own_sum *own) {
+    if (!((uint64_t)owner < spectra->count && spectra->numbers[owner].count > 0.0 &&
+          spectra->numbers[owner].count <= (double)spectra->most))
+        return false;
+    if (owner != *opened)
+        open_sum(own, inner, &spectra->numbers[owner],
+                 spectra->waves + 3 * spectra->most * (size_t)owner, spectra->most);
+    *opened = owner;
+    return true;
+}
+
+size_t mbma_spectra_contact(const mbma_spectra *spectra, const mbma_inner *inner, size_t n,
+                            const int64_t *owner, const double *u, double *force, double *area,
+                            double *stiffness) {
+    int64_t opened = -1;
+    size_t bad = 0;
+    own_sum own;
+    for (size_t k = 0; k < n; k++) {
+        const bool good = open_owner(spectra, inner, owner[k], &opened, &own) && u[k] == u[k];
+        const double known = good ? 0.0 : NAN, gap = u[k];
+        force[k] = stiffness[k] = (gap <= 0.0 ? INFINITY : 0.0) + known;
+        area[k] = (gap <= 0.0 ? 1.0 : 0.0) + known;
+        if (good && gap > 0.0 && gap < own.numbers->h_max && gap <= FARTHEST) {
+            double slope, steep;
+            const double value = log_force_at(&own, gap, &slope) - tail_at(&own, gap);
+            const double endless = exp(value), F = endless * mbma_ended(own.numbers->end - value, &steep);
+            const double over = F / spectra->area_t0;
+            force[k] = F;
+            area[k] = mbma_erf(F * sqrt(2.0 * (1.0 + over) / (own.numbers->s0 + over)));
+            stiffness[k] = (3.0 * tail_at(&own, gap) / gap - 1.0 / (slope * gap)) * endless * steep;
+        }
+        bad += force[k] != force[k];
+    }
+    return bad;
+}
+
+/* Newton's method for ln F before the tail's factor, whose sum with that is `goal`. */
+static double separation_at(const own_sum *s, double goal) {
+    double low = -800.0, high = HEAVIEST, u = 0.0, slope;
+    double x = goal;
+    for (int step = 0; step < MOST_STEPS && goal < HEAVIEST; step++) {
+        u = exp(log_u_of(s, x, &slope));
+        const double miss = x - tail_at(s, u) - goal;
+        const double move = -miss / (1.0 - 3.0 * tail_at(s, u) * slope);
+        *(miss > 0.0 ? &high : &low) = x;
+        /* what is left is of second order */
+        if (fabs(move) <= 100.0 * CLOSE)
+            return u * exp(slope * move);
+        x = x + move > low && x + move < high ? x + move : 0.5 * (low + high);
+    }
+    return u;
+}
+
+size_t mbma_spectra_separation(const mbma_spectra *spectra, const mbma_inner *inner, size_t n,
+                               const int64_t *owner, const double *force, double *u) {
+    int64_t opened = -1;
+    size_t bad = 0;
+    own_sum own;
+    for (size_t k = 0; k < n; k++) {
+        const bool good = open_owner(spectra, inner, owner[k], &opened, &own) && force[k] > 0.0;
+        u[k] = NAN;
+        if (good)
+            u[k] = mbma_min(separation_at(&own, mbma_endless(log(force[k]), own.numbers->end)),
+                            own.numbers->h_max);
+        bad += u[k] != u[k];
+    }
+    return bad;
+}
