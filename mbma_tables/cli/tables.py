@@ -209,6 +209,39 @@ def _make_of_function(
     echo(f"{out}: {table!r}; {out.stat().st_size} bytes")
 
 
+@tables_group.command("export")
+@click.argument("language", metavar="{c|fortran|javascript|matlab|python}")
+@click.argument("table", type=click.Path(path_type=Path))
+@click.option("--name", default="table", show_default=True, help="Of the function.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    default=Path(),
+    help="Folder of the files; default: this one.",
+)
+def export_command(language: str, table: Path, name: str, out: Path) -> None:
+    """Write TABLE, a file made of a function, as source code: an evaluator and the table as data.
+
+    Each has a self-test; islands are exported by `mbma export c --table`.
+
+    Example: mbma tables export c mine.nc --name force
+    """
+    from mbma_tables.export.model.function_code import function_code
+    from mbma_tables.export.text import written_by
+    from mbma_tables.tables.function_table import FunctionTable
+    from mbma_tables.tables.open import open_table
+
+    opened = open_table(table)
+    if not isinstance(opened, FunctionTable):
+        raise InputError(
+            f"{table} holds islands: `mbma export c --table {table}` writes them as C"
+        )
+    command = written_by([language, str(table), "--name", name], "tables export")
+    for file, text in function_code(opened, language, name, command).items():
+        write_file(out / file, text.encode(), make_folders=True)
+        echo(out / file)
+
+
 @tables_group.command("merge")
 @click.argument("out", type=click.Path(path_type=Path))
 @click.argument("folders", nargs=-1, type=click.Path(path_type=Path))
