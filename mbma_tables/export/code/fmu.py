@@ -17,9 +17,9 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor
 from mbma_tables.export.code.language import AskedLaw
 from mbma_tables.export.code.law_code import MAX_NAME, asked_law, text_of
-from mbma_tables.export.code.reserved_words import windows_words
 from mbma_tables.export.exported_law import ExportedLaw
 from mbma_tables.export.model.c_code import BuildError, built_by
+from mbma_tables.export.reserved_words import windows_words
 from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import checked_name, filled, inert, number
 from mbma_tables.surfaces.any_surface import AnySurface

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.common.errors import InputError
-from mbma_tables.export.code.reserved_words import (
+from mbma_tables.export.reserved_words import (
     matlab_words,
     small_words,
     words_of_code,

@@ -10,8 +10,8 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray, needed
 from mbma_tables.common.files import written_bytes
-from mbma_tables.export.code.reserved_words import matlab_words
 from mbma_tables.export.law_table import Curve, LawTable
+from mbma_tables.export.reserved_words import matlab_words
 from mbma_tables.export.targets import AGAINST, Target
 from mbma_tables.export.text import checked_name, comment, csv_cell, number
 

@@ -11,7 +11,7 @@ from mbma_tables.export.code.language import (
     Beside,
     Language,
 )
-from mbma_tables.export.code.reserved_words import small_words
+from mbma_tables.export.reserved_words import small_words
 from mbma_tables.export.text import number
 
 # names of the module itself; the key words of Fortran are not reserved

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from mbma_tables.export.code.language import AskedLaw, Language
 from mbma_tables.export.code.polynomials import Notation, matrix, polynomial_places
-from mbma_tables.export.code.reserved_words import matlab_words
+from mbma_tables.export.reserved_words import matlab_words
 from mbma_tables.export.text import number, template
 
 TEMPLATE = "code/languages/law.m"

@@ -11,7 +11,7 @@ from mbma_tables.export.code.polynomials import (
     law_places,
     polynomial_places,
 )
-from mbma_tables.export.code.reserved_words import small_words, words_of_code
+from mbma_tables.export.reserved_words import small_words, words_of_code
 from mbma_tables.export.text import filled, number, template
 
 TEMPLATE = "code/languages/law.mo"

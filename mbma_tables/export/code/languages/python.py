@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from mbma_tables.export.code.language import NAN, AskedLaw, Language
 from mbma_tables.export.code.polynomials import Notation, brackets, polynomial_places
-from mbma_tables.export.code.reserved_words import small_words
+from mbma_tables.export.reserved_words import small_words
 from mbma_tables.export.text import number
 
 # modules that a module of the same name would hide from numpy and jax
