@@ -1,10 +1,12 @@
-"""The check of circles, `benchmarks/import_circles.py`: nothing imports what is above it."""
+"""Nothing imports what is above it, by `benchmarks/import_circles.py`, or asks which theory it has."""
 
+import ast
 import pathlib
 
 import pytest
 
 from benchmarks import import_circles
+from mbma_tables import theories
 
 ROOT = pathlib.Path(__file__).parents[1]
 # a module that imports the one above it
@@ -42,3 +44,51 @@ def test_an_exception_is_one_of_a_registry_that_needs_it(monkeypatch, registry):
     monkeypatch.setattr(import_circles, "REGISTRIES", others)
     circles = import_circles.circles(ROOT / registry.partition(".")[0])
     assert registry in [name for circle in circles for name in circle]
+
+
+NAMES = {repr(name) for name in (*theories.THEORIES, *theories.OF_MAPS)}
+CLASSES = {type(theories.resolve(name)).__name__ for name in theories.THEORIES}
+CLASSES |= {"Simulated", "BoundaryElements"}
+
+
+def named(node):
+    """Names and literals of an expression, as they are written."""
+    for part in ast.walk(node):
+        if isinstance(part, ast.Attribute):
+            yield part.attr
+        elif isinstance(part, ast.Name | ast.Constant):
+            yield ast.unparse(part)
+
+
+def questions(tree):
+    """Comparisons and questions for a type that name a theory."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Compare):
+            if not (NAMES | CLASSES).isdisjoint(named(node)):
+                yield ast.unparse(node)
+        elif isinstance(node, ast.Call):
+            asks_type = import_circles.name_of(node.func) in ("isinstance", "issubclass")
+            if asks_type and not CLASSES.isdisjoint(named(node.args[1])):
+                yield ast.unparse(node)
+
+
+PLANTED = """
+if theory.name == "mbma" or name in ("persson", other):
+    pass
+if isinstance(theory, (theories.Mbma, Other)) or theory.name == Calibrated.name:
+    pass
+"""
+
+
+def test_a_question_for_a_theorys_name_or_type_is_found():
+    assert len(list(questions(ast.parse(PLANTED)))) == 4
+
+
+def test_no_question_for_a_theorys_name_or_type_outside_of_theories():
+    asked = {}
+    for path in sorted((ROOT / "mbma_tables").rglob("*.py")):
+        if "theories" not in path.parts:
+            found = list(questions(ast.parse(path.read_text(encoding="utf-8"))))
+            if found:
+                asked[path.name] = found
+    assert asked == {}

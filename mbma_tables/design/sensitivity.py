@@ -27,7 +27,6 @@ from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories import resolve
 from mbma_tables.theories.base import Theory, UserTheory
-from mbma_tables.theories.calibrated.theory import Calibrated
 
 if TYPE_CHECKING:
     from mbma_tables.contacts.result import Contact
@@ -455,9 +454,8 @@ def unknowns_of(
     # what keeps points of a map, or the table of their simulation, has the theory of one map
     simulated = moved.map is not None or moved.table is not None
     if simulated and theory is not None:
-        from mbma_tables.theories import BoundaryElements
-
-        if isinstance(theory, BoundaryElements):
+        of_one_map = theory.gaps() is not None
+        if of_one_map:
             return OfOneMap({"heights": 1.0, "lengths": 1.0}, lambda **factors: moved)
     return _of_spectrum(moved, theory)
 
@@ -495,9 +493,8 @@ def _of_spectrum(surface: MeasuredSurface, theory: Theory | None) -> Unknowns:
     own: dict[str, float] = {"heights": 1.0, "lengths": 1.0}
     cut_offs: dict[str, float] = {}
     uncut = surface
-    # the calibrated law uses measured heights, which have their own highest point and
-    # shortest wavelengths
-    takes_map = theory is not None and theory.name == Calibrated.name
+    # measured heights have their own highest point and shortest wavelengths
+    takes_map = theory is not None and theory.takes_heights
     of_its_heights = takes_map or theory is None
     if surface.heights.is_gaussian or not of_its_heights:
         own["h_max"] = float(surface.h_max)

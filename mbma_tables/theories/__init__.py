@@ -9,6 +9,7 @@ import types
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
+from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.shared import shared
 
@@ -151,19 +152,20 @@ def _of_object(chosen: Any, surface: Any) -> Theory:
 
 def _with_options(name: str, options: Mapping[str, Any]) -> Any:
     """A shipped theory with options; those that it does not have are refused."""
-    others = [option for option in options if option not in _options_of(name)]
+    others = [option for option in options if option not in options_of(name)]
     if others:
-        owners = [other for other in _NAMED if others[0] in _options_of(other)]
+        owners = [other for other in _NAMED if others[0] in options_of(other)]
         owner = f"theory {owners[0]!r} alone" if owners else "no theory"
-        known = ", ".join(_options_of(name)) or "none"
+        known = ", ".join(options_of(name)) or "none"
         raise InputError(
             f"{', '.join(others)}: options of {owner}, not of {name!r}, which has {known}"
         )
     return _class_of(name)(**options)
 
 
-def _options_of(name: str) -> list[str]:
-    """Names of the options of a shipped theory."""
+def options_of(name: str) -> list[str]:
+    """Names of the options of a shipped theory; an error for an unknown name."""
+    require_name("theory", name, _NAMED)
     return [field.name for field in dataclasses.fields(_class_of(name))]
 
 
@@ -208,7 +210,7 @@ def default_name(
     """
     for option in options:
         for name in _NAMED:
-            if option in _options_of(name):
+            if option in options_of(name):
                 return name
     if given_name == "separation":
         return "mbma"

@@ -25,6 +25,7 @@ from mbma_tables.common.arguments import (
 from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.common.shared import frozen
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import inversion, tested
 from mbma_tables.theories.evidence import shipped_deviations
 from mbma_tables.theories.inversion import FEW_LOOKS, LOOKS, Curve, Indices
@@ -125,6 +126,8 @@ class Theory(abc.ABC):
     bends_in_area = False  # whether at its `bends` only the area is not smooth
     # whether force vanishes at u = h_max; else its Gaussian heights are unbounded
     ends_at_h_max = True
+    # whether it goes by the heights of a map, where a surface has them, and not by a spectrum
+    takes_heights = False
     # whether it simulates a map, and can do so anew with a hardness
     presses_anew = False
 
@@ -203,6 +206,11 @@ class Theory(abc.ABC):
         """Name under which its scatter against boundary elements is stored."""
         return self.name
 
+    def by_heights(self, surface: AnySurface) -> bool:
+        """Whether it goes by all heights of the surface's map."""
+        has_heights = isinstance(surface, MeasuredSurface) and surface.bearing is not None
+        return self.takes_heights and has_heights
+
     @property
     def elastic(self) -> Theory:
         """The theory of the elastic contact, if this one includes yielding."""
@@ -257,8 +265,7 @@ class Theory(abc.ABC):
         self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray
     ) -> Mapping[str, NDArray[np.bool_]]:
         """Reasons why results lie outside the tested range of the theory, each with a mask."""
-        by_heights = self.scatter_name(surface) != self.name
-        reasons = tested.untested(surface, answer.area, by_heights)
+        reasons = tested.untested(surface, answer.area, self.by_heights(surface))
         if self.ends_at_h_max:
             return reasons
         beyond = mean_separation > np.asarray(surface.h_max)

@@ -7,7 +7,7 @@ from helpers import contact_of
 
 from generate.boundary_elements.evidence import evidence
 from mbma_tables import Bodies, InputError, Joint, Surface, contact, contact_law
-from mbma_tables.theories import THEORIES, Calibrated
+from mbma_tables.theories import THEORIES, Calibrated, Mbma, Persson
 from mbma_tables.theories.hardness import with_hardness
 
 each = pytest.mark.parametrize("theory", THEORIES)
@@ -48,6 +48,26 @@ def test_valid_implies_within_the_range_of_the_simulations(theory):
     # and beside it no comparison is made up
     beyond = (surface.hurst < least_hurst) | (surface.zeta_1 > max(zetas))
     assert np.isnan(pressed.scatter[beyond]).all()
+
+
+@pytest.mark.parametrize(
+    "theory",
+    [
+        "calibrated",
+        "persson",
+        Persson("simplified"),
+        "mbma",
+        Mbma(variant="printed"),
+        Mbma(variant="fitted"),
+    ],
+    ids=str,
+)
+def test_heights_beyond_those_simulated_are_not_valid_by_any_form_of_a_theory(theory):
+    """Forms with a scatter of their own were taken for theories that know the heights of a map."""
+    heights = np.array([2.3, 3.5, 8.2])
+    surface = Surface(0.8, 0.01, 0.2, 1.0, heights)
+    pressed = contact(surface, area=0.01, theory=theory)
+    assert pressed.valid.tolist() == [False, True, False]
 
 
 @each

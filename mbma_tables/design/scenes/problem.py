@@ -25,7 +25,7 @@ from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.tables.island4d import Island4dModel
 from mbma_tables.tables.universal import UniversalModel
-from mbma_tables.theories import OF_MAPS, THEORIES, default_name, resolve
+from mbma_tables.theories import OF_MAPS, THEORIES, default_name, options_of, resolve
 from mbma_tables.theories.base import Theory
 from mbma_tables.theories.mbma.models import with_table
 
@@ -42,6 +42,7 @@ OF_CONTACT = (
     "yield",
 )
 OF_ISLANDS = ("island_statistics", "pressure_profile")  # available for MBMA only
+OF_SUMS = "island_model"  # option of theories that sum islands
 OUTPUTS = (*OF_CONTACT[:6], *OF_ISLANDS, "comparison", *OF_CONTACT[6:])
 # part of the model, and on unless switched off
 REFINEMENTS = ("subscale_area", "sphere_deformation", "finite_height")
@@ -148,20 +149,18 @@ class Problem:
 
     def _default_theory(self) -> str:
         """MBMA where an option or effect is of it alone, else by the rule of `contact`."""
+        options = []
         needs_islands = bool(self.outputs.intersection(OF_ISLANDS))
         if self.dropped or needs_islands or self.island_model is not None:
-            return "mbma"
+            options.append(OF_SUMS)
         if get_variant(self.variant) != get_variant("reported"):
-            return "mbma"
+            options.append("variant")
         given_name = "separation" if self.separations is not None else None
-        return default_name(self.surface, given_name)
+        return default_name(self.surface, given_name, options)
 
     def _take_options_of_theory(self) -> None:
         """Take options of MBMA as an object for those of the scene, whose steps choose the others."""
-        if (
-            not isinstance(self.theory, Theory)
-            or "island_model" not in self.theory.options
-        ):
+        if not isinstance(self.theory, Theory) or OF_SUMS not in self.theory.options:
             return
         for name, value in self.theory.changed_options.items():
             if name == "outside":
@@ -315,7 +314,8 @@ class Problem:
             options.append("without")
         options += [f"effect {name!r}" for name in OF_ISLANDS if name in self.outputs]
         if options:
-            not_of = f"of theory 'mbma', not of {self.theory_name!r}"
+            owner = default_name(self.surface, options=[OF_SUMS])
+            not_of = f"of theory {owner!r}, not of {self.theory_name!r}"
             raise InputError(f"{' and '.join(options)}: {not_of}: leave out")
 
     def computes(self, effect: str) -> bool:
@@ -330,8 +330,8 @@ class Problem:
 
     @property
     def sums_islands(self) -> bool:
-        """Whether the scene's theory is MBMA, whose islands and refinements a plan chooses."""
-        return bool(self.theory == "mbma")
+        """Whether the scene's theory sums islands, whose model and refinements a plan chooses."""
+        return isinstance(self.theory, str) and OF_SUMS in options_of(self.theory)
 
     @property
     def theory_name(self) -> str:

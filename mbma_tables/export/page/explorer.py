@@ -26,7 +26,7 @@ from mbma_tables.islands.variants import FITTED, PRINTED, REPORTED, get_variant
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.tables.open import universal_model
-from mbma_tables.theories import OF_MAPS, default_name, tested
+from mbma_tables.theories import OF_MAPS, default_name, options_of, tested
 from mbma_tables.theories.evidence import COMPARED, QUANTITIES, shipped_deviations
 from mbma_tables.theories.mbma import theory as mbma
 from mbma_tables.theories.yielding import formulas as hardness_law
@@ -151,12 +151,13 @@ def explorer_page(
         theory = default_name(surface, options=options)
     # a page has no simulation of a map
     theory = "calibrated" if theory in OF_MAPS else theory
-    if theory == "mbma" and measured:
-        raise InputError(
-            "MBMA in the page is of five numbers: take another theory, or surface.fit()"
-        )
     if theory not in THEORIES:
         raise InputError(f"the page has the theories {THEORIES}, got {theory!r}")
+    if measured and "island_model" in options_of(theory):
+        raise InputError(
+            f"islands in the page, of theory {theory!r}, are of surfaces of five numbers: "
+            "take another theory, or surface.fit()"
+        )
     modulus = (
         1.0
         if E_star is None

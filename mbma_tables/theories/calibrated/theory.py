@@ -211,6 +211,7 @@ class Calibrated(Theory):
     """
 
     name = "calibrated"
+    takes_heights = True
 
     def interval(
         self, surface: AnySurface, quantity: str = "pressure"
@@ -342,11 +343,11 @@ class Calibrated(Theory):
         return {text: straight & ~light, **reasons}
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
-        return surface.departures(by_map=self.scatter_name(surface) != self.name)
+        return surface.departures(by_map=self.by_heights(surface))
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Scatter as of any theory; for maps with an addition to that of Gaussian ones."""
-        if self.scatter_name(surface) == self.name:
+        if not self.by_heights(surface):
             return super().scatter(surface, quantity, area)
         assert isinstance(surface, MeasuredSurface)
         if surface.outside(PRESSED):
@@ -363,5 +364,4 @@ class Calibrated(Theory):
 
     def scatter_name(self, surface: AnySurface) -> str:
         """With a map its own."""
-        by_map = isinstance(surface, MeasuredSurface) and surface.bearing is not None
-        return f"{self.name}_map" if by_map else self.name
+        return f"{self.name}_map" if self.by_heights(surface) else self.name
