@@ -108,6 +108,7 @@ for command in (
     *(
         tables.cache_command,
         scene.joint_command,
+        scene.batch_command,
         scene.plan_command,
         scene.run_command,
         commands.cost_command,

@@ -43,6 +43,13 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".nc", ".csv")
 toml_file = click.argument("file", type=click.Path(path_type=Path))
+settings_option = click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="An entry of the file or in place of one: part_a.Ra='0.25..0.4 um'; may be repeated.",
+)
 
 
 @click.command("plan", short_help="Plan of a scene: steps, errors and computing times.")
@@ -180,6 +187,68 @@ _joint_options = option_group(
 )
 
 
+@click.command("batch", short_help="A joint for each row of a table of designs.")
+@click.argument("designs", type=click.Path(path_type=Path, allow_dash=True))
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    required=True,
+    help="Write answers.csv, .parquet or .nc; - for CSV to stdout.",
+)
+@click.option(
+    "--file",
+    type=click.Path(path_type=Path),
+    metavar="TOML",
+    help="A joint whose entries all rows have, where no column has them.",
+)
+@settings_option
+@click.option(
+    "--quantity",
+    "quantities",
+    metavar="NAME[,NAME]",
+    help="Quantities of the answers; else those with a model uncertainty.",
+)
+@click.option(
+    "--keep",
+    metavar="NAME[,NAME]",
+    default="",
+    help="Columns that are no arguments, to be written as they are.",
+)
+def batch_command(
+    designs: Path,
+    out: Path,
+    file: Path | None,
+    settings: tuple[str, ...],
+    quantities: str | None,
+    keep: str,
+) -> None:
+    """Quantities of a joint for each row of the table DESIGNS (.csv, .parquet, .nc).
+
+    Columns are named as entries of a joint's file, with their unit: 'part_a.Ra [um]',
+    'bodies.hardness [GPa]', 'nominal_area [cm^2]', and 'pressure [MPa]' or another load. Rows that
+    are refused stay in the table, and the column "reason" says why.
+
+    Example: mbma batch examples/designs.csv --file examples/joint.toml --out answers.csv
+    """
+    from mbma_tables.design.batch import batch
+
+    entries = {} if file is None else read_toml(file, "joint")
+    found = batch(
+        designs,
+        out,
+        common=with_settings(entries, settings),
+        quantities=None if quantities is None else quantities.split(","),
+        keep=[name for name in keep.split(",") if name],
+        path="joint" if file is None else file,
+    )
+    echo(
+        f"mbma batch: {found.rows} rows, {found.refused} of them refused, "
+        f"{found.not_valid} not valid",
+        err=True,
+    )
+
+
 def _picture(joint: Joint, plot: Path | None) -> bytes:
     """The picture of a joint, if one is asked for."""
     from mbma_tables.common.plots import to_picture
@@ -238,13 +307,7 @@ def _report_of_ranges(
     "joint", short_help="Stiffness, area, gap and conductance of two metal parts."
 )
 @click.argument("file", type=click.Path(path_type=Path), required=False)
-@click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="An entry of the file or in place of one: part_a.Ra='0.25..0.4 um'; may be repeated.",
-)
+@settings_option
 @numbers_option(
     "--pressure",
     "-p",

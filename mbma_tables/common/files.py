@@ -11,10 +11,10 @@ import sys
 import tempfile
 import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.errors import InputError
+from mbma_tables.common.errors import InputError, MbmaError
 
 MAX_BYTES = 1 << 30  # of an input file
 ABANDONED = 3600.0  # s, age from which on a draft is no longer being written
@@ -84,6 +84,18 @@ def write_file(
         sys.stdout.buffer.write(content)
         sys.stdout.flush()
         return
+    with drafted(path, make_folders) as draft, open(draft, "xb") as stream:
+        stream.write(content)
+
+
+@contextlib.contextmanager
+def drafted(
+    path: os.PathLike[str] | str, make_folders: bool = False
+) -> Iterator[pathlib.Path]:
+    """A temporary name beside a file for what is written in parts; at the end it replaces the file.
+
+    After an error the file is as it was before. Links are followed.
+    """
     target = pathlib.Path(os.path.realpath(path))
     draft = target.with_name(f".{target.name}.{uuid.uuid4().hex[:12]}.draft")
     # drafts of runs that were killed
@@ -100,9 +112,8 @@ def write_file(
             if not stat.S_ISREG(os.stat(target).st_mode):
                 raise InputError(f"{path} cannot be written: it is not a regular file")
         try:
-            with open(draft, "xb") as stream:
-                stream.write(content)
-                stream.flush()
+            yield draft
+            with open(draft, "rb") as stream:
                 os.fsync(stream.fileno())
             with contextlib.suppress(FileNotFoundError):
                 shutil.copymode(target, draft)
@@ -111,6 +122,8 @@ def write_file(
             with contextlib.suppress(OSError):
                 draft.unlink()
     except OSError as fault:
+        if isinstance(fault, MbmaError):
+            raise
         raise InputError(f"{path} cannot be written: {fault.strerror or fault}") from None
 
 

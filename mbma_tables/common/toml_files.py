@@ -46,17 +46,22 @@ def with_settings(entries: Mapping[str, Any], settings: Sequence[str]) -> dict[s
         if not (name and separator and value) or name in names:
             raise InputError(f"settings are NAME=VALUE, each name once, got {setting!r}")
         names.add(name)
-        table = made
-        *tables, last = name.split(".")
-        for each in tables:
-            table = table.setdefault(each, {})
-            if not isinstance(table, dict):
-                raise InputError(f"{setting!r}: {each!r} is no table of the file")
-        table[last] = _value(value)
+        set_entry(made, name, value_of(value))
     return made
 
 
-def _value(text: str) -> Any:
+def set_entry(entries: dict[str, Any], name: str, value: Any) -> None:
+    """Set an entry by a name with dots, making the tables that it is in."""
+    table = entries
+    *tables, last = name.split(".")
+    for each in tables:
+        table = table.setdefault(each, {})
+        if not isinstance(table, dict):
+            raise InputError(f"{name!r}: {each!r} is no table of the file")
+    table[last] = value
+
+
+def value_of(text: str) -> Any:
     """A value as TOML has it, or else the text."""
     try:
         entries = tomllib.loads(f"value = {text}")

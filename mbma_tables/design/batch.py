@@ -1,0 +1,571 @@
+"""Tables of designs: a joint in each row, its numbers by column, and every quantity beside them."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import itertools
+import os
+import pathlib
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mbma_tables.bodies.bodies import Bodies, names_metals
+from mbma_tables.bodies.materials import Metal
+from mbma_tables.common.arguments import FloatArray, nearest
+from mbma_tables.common.errors import InputError, MbmaError
+from mbma_tables.common.progress import doing, shown
+from mbma_tables.common.toml_files import set_entry, value_of
+from mbma_tables.common.units import (
+    DIMENSIONS,
+    RANGE,
+    SIZES,
+    Units,
+    known,
+    read,
+    unit_of,
+)
+from mbma_tables.contacts.quantities import registry
+from mbma_tables.contacts.quantities.interface import Gas
+from mbma_tables.contacts.result import Contact
+from mbma_tables.design.joint import FACES, PLAIN_STRESS, Joint
+from mbma_tables.design.row_files import (
+    Chunk,
+    Source,
+    open_writer,
+    opened,
+    require_writable,
+)
+from mbma_tables.surfaces.surface import Surface
+
+# arguments whose cells are no numbers
+NAMES = ("bodies", "metals", "gas", "name", "theory", "direction", "process")
+REASON = "reason"
+VALID = "valid"
+# units of arguments that are neither lengths nor stresses
+OTHER_UNITS = {"force": "N", "conductivity": "W/(m K)", "temperature": "K"}
+# of a row in which something is missing
+EMPTY = "{name} is empty"
+
+
+def _arguments(of: Callable[..., Any]) -> list[str]:
+    return [name for name in inspect.signature(of).parameters if name != "self"]
+
+
+def known_columns() -> list[str]:
+    """Names of columns: the arguments of `Joint` as in its files, and what is given in `Joint.at`."""
+    of_joint = [each.name for each in dataclasses.fields(Joint) if each.init]
+    names = [name for name in of_joint if name not in FACES]
+    of_face = dict.fromkeys((*_arguments(Surface.from_roughness), *_arguments(Surface)))
+    for left_out in ("nominal_area", "provenance", "fit"):
+        of_face.pop(left_out, None)
+    names += [f"{face}.{name}" for face in FACES for name in of_face if name != "unit"]
+    names += [f"bodies.{each.name}" for each in dataclasses.fields(Bodies)]
+    names += [f"bodies.{name}" for name in _arguments(Metal) if name not in vars(Bodies)]
+    names += [f"gas.{each.name}" for each in dataclasses.fields(Gas)]
+    return [*dict.fromkeys(names), *_arguments(Joint.at), "force"]
+
+
+def loads() -> list[str]:
+    """Names of the columns of which one is needed."""
+    return [*_arguments(Joint.at), "force"]
+
+
+def _without_index(name: str) -> str:
+    """The name of an argument that is one of each body: "bodies" of "bodies.0"."""
+    return re.sub(r"\.[01]$", "", name)
+
+
+@dataclasses.dataclass(frozen=True)
+class Column:
+    """A column of numbers, or of names."""
+
+    name: str
+    unit: str  # of its header
+
+    @property
+    def argument(self) -> str:
+        """The argument's own name."""
+        name = _without_index(self.name).rpartition(".")[2]
+        return "gas_pressure" if self.name == "gas.pressure" else name
+
+    @property
+    def is_name(self) -> bool:
+        """Whether cells are names, not numbers."""
+        return self.argument in NAMES
+
+    @property
+    def needs_unit(self) -> bool:
+        """Whether its numbers have no meaning without a unit."""
+        return any(DIMENSIONS.get(self.argument, ())) or self.argument in OTHER_UNITS
+
+    @property
+    def is_length(self) -> bool:
+        """Whether its unit is a power of a length."""
+        return bool(DIMENSIONS.get(self.argument, (0, 0))[0])
+
+    def factor_to(self, units: Units) -> float:
+        """What numbers of the column are multiplied with, in these units.
+
+        Raises
+        ------
+        InputError
+            For a unit that the argument does not have.
+        """
+        if not self.unit:
+            return 1.0
+        if self.argument == "force":
+            return float(SIZES["force"][known(self.unit, "force")])
+        if self.argument == "conductivity":
+            units.conductivities(f"1 {self.unit}")
+            return 1.0
+        if self.argument == "temperature" and self.unit == "K":
+            return 1.0
+        if self.name == "gas.pressure":
+            units = Units(stress="Pa")
+        return float(units.number(self.argument, f"1 {self.unit}"))
+
+    def numbers(self, cells: Any, units: Units) -> tuple[FloatArray, dict[int, str]]:
+        """Numbers in these units, NaN where there are none, and why."""
+        is_plain = self.needs_unit and not self.unit
+        try:
+            numbers = np.asarray(cells).astype(float)
+        except ValueError:
+            numbers = np.full(len(cells), np.nan)
+        if np.isfinite(numbers).all() and not is_plain:
+            return numbers * self.factor_to(units), {}
+        texts = cells
+        if isinstance(cells, np.ndarray):
+            texts = ["" if cell != cell else repr(cell) for cell in cells.tolist()]
+        return self._cell_by_cell(texts, units)
+
+    def _cell_by_cell(
+        self, cells: Sequence[str], units: Units
+    ) -> tuple[FloatArray, dict[int, str]]:
+        numbers = np.full(len(cells), np.nan)
+        faults = {}
+        factor = self.factor_to(units)
+        for k, cell in enumerate(cells):
+            try:
+                numbers[k] = self._number(cell, units, factor)
+            except InputError as fault:
+                text = str(fault)
+                said = text if self.argument in text else f"{self.name}: {text}"
+                faults[k] = said
+        return numbers, faults
+
+    def _number(self, cell: str, units: Units, factor: float) -> float:
+        """The number of a cell, which has a unit of its own only if the header has none."""
+        if not cell.strip():
+            raise InputError(EMPTY.format(name=self.name))
+        try:
+            number = float(cell)
+        except ValueError:
+            pass
+        else:
+            if not np.isfinite(number):
+                raise InputError(f"{self.name} must be finite, got {cell!r}")
+            if self.needs_unit and not self.unit:
+                sample = OTHER_UNITS.get(self.argument) or unit_of(self.argument, units)
+                raise InputError(
+                    f"{self.name} = {cell!r} has no unit: write it in the header, "
+                    f"'{self.name} [{sample}]'"
+                )
+            return number * factor
+        if RANGE.search(cell):
+            raise InputError(
+                f"{self.name} = {cell!r} is a range, and a row has one number"
+            )
+        if self.unit:
+            raise InputError(
+                f"{self.name} = {cell!r} is no number; its unit is in the header, {self.unit}"
+            )
+        if self.argument in OTHER_UNITS:
+            raise InputError(f"{self.name} = {cell!r}: write the unit in the header")
+        if self.name == "gas.pressure":
+            units = Units(stress="Pa")
+        return float(units.number(self.argument, cell))
+
+
+@dataclasses.dataclass(frozen=True)
+class Designs:
+    """The columns of a table of designs, and what all rows have in common."""
+
+    columns: tuple[Column, ...]
+    common: Mapping[str, Any]  # entries as those of a file of a joint, with the load
+    units: Units  # of all numbers: lengths and stresses
+    path: pathlib.Path = pathlib.Path("joint")  # of the file of common entries
+
+    def require_load(self) -> str:
+        """The name of what is given, a pressure, a gap, an area or a force; an error for none and several."""
+        names = [column.name for column in self.columns] + list(self.common)
+        given = [name for name in loads() if name in names]
+        if len(given) != 1:
+            got = " and ".join(given) or "none"
+            raise InputError(f"one of {', '.join(loads())} is needed, got {got}")
+        return given[0]
+
+    def joint(self, numbers: Mapping[str, Any]) -> tuple[Joint, dict[str, Any]]:
+        """The joint of some rows, whose columns are arrays or one number each, and its load."""
+        entries = dict(self.common)
+        for name in (*FACES, "bodies", "gas"):
+            if isinstance(entries.get(name), Mapping):
+                entries[name] = dict(entries[name])
+        for column in self.columns:
+            if not column.is_name:
+                value = numbers[column.name]
+                if column.argument == "conductivity":
+                    value = _conductivity(column, value)
+                set_entry(entries, column.name, value)
+        entries = {name: _listed(entry) for name, entry in entries.items()}
+        entries["bodies"] = _in_unit_of_results(entries.get("bodies"))
+        load = self.require_load()
+        given = {load: entries.pop(load)}
+        for face in FACES:
+            if isinstance(entries.get(face), Mapping):
+                entries[face] = self._face(entries[face])
+        joint = Joint.from_entries(entries, self.path)
+        if "force" in given:
+            return joint, {"pressure": _pressure(joint, given["force"])}
+        return joint, given
+
+    def _face(self, part: Mapping[str, Any]) -> Any:
+        """A face by roughness parameters as they are, or the surface of five numbers."""
+        in_unit = {**part, "unit": self.units.length}
+        if "h_rms" not in part:
+            return in_unit
+        try:
+            return Surface(**in_unit)
+        except TypeError as fault:
+            raise InputError(fault) from None
+
+
+def _in_unit_of_results(bodies: Any) -> Any:
+    """Bodies whose modulus, if it is a text, is in the unit of all plain stresses of a joint."""
+    if isinstance(bodies, dict) and isinstance(bodies.get("E_star"), str):
+        return bodies | {"E_star": _in_unit_of_results(bodies["E_star"])}
+    if not isinstance(bodies, str) or names_metals(bodies):
+        return bodies
+    number = Units(stress=PLAIN_STRESS).number("E_star", bodies)
+    return f"{number!r} {PLAIN_STRESS}"
+
+
+def _conductivity(column: Column, value: Any) -> Any:
+    """Conductivities with their unit; of both bodies where the column has no index."""
+    texts: Any = f"{value!r} {column.unit}"
+    if np.ndim(value):
+        texts = [f"{each!r} {column.unit}" for each in value.tolist()]
+    return texts if column.name != "bodies.conductivity" else (texts, texts)
+
+
+def _pressure(joint: Joint, force: Any) -> Any:
+    if np.ndim(force):
+        return [joint.pressure_of(each) for each in force.tolist()]
+    return joint.pressure_of(force)
+
+
+def _listed(entry: Any) -> Any:
+    """An entry of both bodies by their index as a list."""
+    if not isinstance(entry, dict):
+        return entry
+    if entry.keys() == {"0", "1"}:
+        return [entry["0"], entry["1"]]
+    return {name: _listed(each) for name, each in entry.items()}
+
+
+@dataclasses.dataclass
+class Answers:
+    """Quantities of the rows of a chunk, NaN where there are none, and why."""
+
+    values: dict[str, FloatArray]
+    units: dict[str, str]
+    valid: list[str]
+    reasons: list[str]
+
+    @classmethod
+    def empty(cls, names: Sequence[str], rows: int, units: dict[str, str]) -> Answers:
+        """Of rows that are not computed yet; units are shared by all chunks."""
+        values = {name: np.full(rows, np.nan) for name in names}
+        return cls(values, units, [""] * rows, [""] * rows)
+
+    def put(self, rows: FloatArray, pressed: Contact) -> None:
+        """Enter the quantities of a contact of some rows."""
+        for name, column in self.values.items():
+            declared = registry.get(name)
+            if not declared.is_available(pressed):
+                continue
+            unit = declared.unit(pressed)
+            if self.units.setdefault(name, unit) != unit:
+                raise InputError(
+                    f"{name} is in {unit}, and in {self.units[name]} in rows before"
+                )
+            column[rows] = pressed.quantity(name)
+        valid = np.broadcast_to(pressed.valid, rows.shape)
+        for row, is_valid in zip(rows.tolist(), valid.tolist(), strict=True):
+            self.valid[row] = "yes" if is_valid else "no"
+        for reason, mask in pressed.reasons.items():
+            for row in rows[np.broadcast_to(mask, rows.shape)].tolist():
+                earlier = self.reasons[row]
+                self.reasons[row] = f"{earlier}; {reason}" if earlier else reason
+
+
+def _solve(
+    designs: Designs, numbers: Mapping[str, Any], rows: Any, answers: Answers
+) -> None:
+    """Compute rows as one batch; those that refuse it are found and named."""
+    if rows.size == 0:
+        return
+    is_one = rows.size == 1
+    some = {
+        name: column[rows[0]].item() if is_one else column[rows]
+        for name, column in numbers.items()
+    }
+    try:
+        joint, given = designs.joint(some)
+        joint.require_known("a row")
+        answers.put(rows, joint.at(**given))
+    except MbmaError as fault:
+        if is_one:
+            answers.reasons[rows[0]] = str(fault)
+            answers.valid[rows[0]] = ""
+            return
+        bad = np.asarray(getattr(fault, "mask", None))
+        if bad.shape != rows.shape or not bad.any():
+            bad = np.zeros(rows.shape, bool)
+            bad[: rows.size // 2] = True
+            _solve(designs, numbers, rows[bad], answers)
+        else:
+            for row in rows[bad]:
+                _solve(designs, numbers, np.array([row]), answers)
+        _solve(designs, numbers, rows[~bad], answers)
+
+
+def answered(
+    designs: Designs, chunk: Chunk, names: Sequence[str], units: dict[str, str]
+) -> tuple[Answers, dict[str, FloatArray]]:
+    """Quantities of a chunk of rows, and its numbers by column."""
+    answers = Answers.empty(names, chunk.rows, units)
+    faults = dict(chunk.faults)
+    numbers: dict[str, FloatArray] = {}
+    texts: list[Column] = []
+    for column in designs.columns:
+        cells = chunk.columns[column.name]
+        if column.is_name:
+            texts.append(column)
+            missing = [k for k, cell in enumerate(cells) if not str(cell).strip()]
+            new = dict.fromkeys(missing, EMPTY.format(name=column.name))
+        else:
+            numbers[column.name], new = column.numbers(cells, designs.units)
+        for row, fault in new.items():
+            faults[row] = f"{faults[row]}; {fault}" if row in faults else fault
+    for row, fault in faults.items():
+        answers.reasons[row] = fault
+    groups: dict[tuple[str, ...], list[int]] = {}
+    for row in range(chunk.rows):
+        if row not in faults:
+            key = tuple(chunk.columns[column.name][row].strip() for column in texts)
+            groups.setdefault(key, []).append(row)
+    for key, members in groups.items():
+        given = {c.name: _name_of(cell) for c, cell in zip(texts, key, strict=True)}
+        common = _with(designs.common, given)
+        own = dataclasses.replace(designs, common=common)
+        _solve(own, numbers, np.array(members), answers)
+    return answers, numbers
+
+
+def _name_of(cell: str) -> Any:
+    """A name as it is, which may look like a number ("1.4301"); a list as TOML has it."""
+    value = value_of(cell)
+    return value if isinstance(value, list | dict) else cell
+
+
+def _with(common: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Common entries with the names of a group of rows."""
+    entries = {
+        name: dict(entry) if isinstance(entry, Mapping) else entry
+        for name, entry in common.items()
+    }
+    for name, value in given.items():
+        set_entry(entries, name, value)
+    return entries
+
+
+def designs_of(
+    source: Source,
+    common: Mapping[str, Any],
+    keep: Sequence[str] = (),
+    path: pathlib.Path = pathlib.Path("joint"),
+) -> Designs:
+    """The columns of a source as arguments; unknown ones are refused, but for those to keep."""
+    arguments = known_columns()
+    columns = []
+    for name, unit in source.units.items():
+        if name in keep:
+            continue
+        if _without_index(name) not in arguments:
+            raise InputError(
+                f"column {source.headers[name]!r} is no argument: {nearest(name, arguments)}; "
+                "columns that are none are named by --keep"
+            )
+        columns.append(Column(name, unit))
+    for name in keep:
+        if name not in source.units:
+            raise InputError(f"no column is named {name!r}, of those to keep")
+    entries = _with(common, {})
+    for column in columns:
+        if column.unit and column.is_name:
+            raise InputError(
+                f"column {column.name!r} has names, and no unit {column.unit!r}"
+            )
+        try:
+            column.factor_to(Units("um", PLAIN_STRESS))
+        except InputError as fault:
+            header = source.headers[column.name]
+            raise InputError(f"column {header!r}: {fault}") from None
+        # refuses both a name and numbers of one argument, "bodies" and "bodies.hardness"
+        set_entry(entries, column.name, 1.0)
+    lengths = [column for column in columns if column.is_length and column.unit]
+    length = read(lengths[0].argument, f"1 {lengths[0].unit}")[1] if lengths else "um"
+    units = Units(length, PLAIN_STRESS)
+    designs = Designs(tuple(columns), common, units, path)
+    designs.require_load()
+    return designs
+
+
+def names_of_results(load: str, quantities: Sequence[str] | None) -> list[str]:
+    """Quantities of the answers and their model uncertainties: those asked for, or those that sensitivities have."""
+    asked = registry.results() if quantities is None else list(quantities)
+    names = [name for name in dict.fromkeys(asked) if name != load]
+    stated = [registry.get(name).uncertainty for name in names]
+    names += [name for name in stated if name is not None]
+    return [name for name in dict.fromkeys(names) if name != VALID]
+
+
+@dataclasses.dataclass(frozen=True)
+class Summary:
+    """How many rows a table had, and how many of them have no answer or one that is not valid."""
+
+    rows: int
+    refused: int
+    not_valid: int
+
+
+def batch(
+    designs: str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    *,
+    common: Mapping[str, Any] | None = None,
+    quantities: Sequence[str] | None = None,
+    keep: Sequence[str] = (),
+    path: str | os.PathLike[str] = "joint",
+) -> Summary:
+    r"""Compute a joint for each row of a table, and write the rows with every quantity beside them.
+
+    Parameters
+    ----------
+    designs : path-like
+        A file .csv, .parquet or .nc (variables of one dimension). Columns are named as the
+        arguments of `Joint` in its files, with their unit: "part_a.Ra [um]",
+        "part_a.hurst", "nominal_area [cm^2]", "bodies.hardness [GPa]", "bodies.0",
+        "pressure [MPa]"; "part_a.h_rms [um]" with the other numbers of `Surface` in place
+        of roughness parameters. Cells may have units of their own, "0.4 um", in columns
+        without one. A column "pressure", "force", or another load is needed.
+    out : path-like
+        The file to write, of any of these kinds.
+    common : mapping, optional
+        Entries that all rows have, as those of a file of a joint, also a load.
+    quantities : sequence of str, optional
+        Default: those with a model uncertainty. Their model uncertainties are beside them.
+    keep : sequence of str
+        Columns that are no arguments, to be written as they are.
+    path : path-like
+        File of the common entries, for paths of maps.
+
+    Returns
+    -------
+    Summary
+
+    Raises
+    ------
+    InputError
+        For unknown columns, with the nearest name, columns that are there twice, units
+        that an argument does not have, and files that are no tables. Rows that are
+        refused stay in the table, without quantities: their column "reason" says why,
+        and that of answers that are not valid says why not.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> from mbma_tables.design.batch import batch
+    >>> face = {"hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+    >>> common = {"bodies": "steel 1020", "nominal_area": "4 cm^2", "part_a": face}
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     table = pathlib.Path(folder, "designs.csv")
+    ...     _ = table.write_text("part_a.Ra [um],pressure [MPa]\n0.4,10\n-1,10\n")
+    ...     found = batch(table, table.with_name("answers.csv"), common=common)
+    ...     lines = table.with_name("answers.csv").read_text().splitlines()
+    >>> found
+    Summary(rows=2, refused=1, not_valid=0)
+    >>> lines[2].rpartition('"part_a: ')[2]
+    'Ra must be positive, got -1"'
+    """
+    target = pathlib.Path(out)
+    require_writable(target)
+    with opened(pathlib.Path(designs)) as source, shown("rows"):
+        table = designs_of(source, common or {}, keep, pathlib.Path(path))
+        names = names_of_results(table.require_load(), quantities)
+        clashes = [name for name in source.units if name in (*names, VALID, REASON)]
+        if clashes:
+            listed = ", ".join(clashes)
+            raise InputError(f"columns are named as those of answers: {listed}")
+        return _written(source, table, names, target)
+
+
+def _written(
+    source: Source, designs: Designs, names: Sequence[str], target: pathlib.Path
+) -> Summary:
+    """Compute and write chunk by chunk."""
+    rows = refused = not_valid = 0
+    chunks = _computed(source, designs, names)
+    first = next(chunks, None)
+    if first is None:
+        raise InputError("the table has no rows")
+    answers = first[1]
+    units = dict(source.units)
+    for name in names:
+        units[name] = answers.units.get(name) or registry.get(name).unit_in(designs.units)
+    texts = dict.fromkeys((VALID, REASON), "")
+    with open_writer(target, units | texts) as write:
+        for chunk, answers, numbers in itertools.chain([first], chunks):
+            columns = dict(chunk.columns)
+            if target.suffix != ".csv" and str(target) != "-":
+                columns |= {
+                    name: each / _factor(designs, name) for name, each in numbers.items()
+                }
+            columns |= answers.values
+            columns |= {VALID: answers.valid, REASON: answers.reasons}
+            write(columns)
+            rows += chunk.rows
+            refused += answers.valid.count("")
+            not_valid += answers.valid.count("no")
+            doing(f"{rows:,} rows, {chunk.done:.0%} of the table")
+    return Summary(rows, refused, not_valid)
+
+
+def _factor(designs: Designs, name: str) -> float:
+    """That of a column from its own unit to those of the designs."""
+    column = next(each for each in designs.columns if each.name == name)
+    return column.factor_to(designs.units)
+
+
+def _computed(
+    source: Source, designs: Designs, names: Sequence[str]
+) -> Iterator[tuple[Chunk, Answers, dict[str, FloatArray]]]:
+    """The chunks of a source with their answers; quantities have the units of the first ones."""
+    units: dict[str, str] = {}
+    for chunk in source.chunks:
+        answers, numbers = answered(designs, chunk, names, units)
+        yield chunk, answers, numbers
