@@ -17,9 +17,9 @@ from mbma_tables.common.units import (
     DIMENSIONS,
     SIZES,
     Units,
+    in_one_unit,
     known,
     read,
-    resolve,
     unit_of,
 )
 from mbma_tables.contacts.quantities.registry import registry
@@ -160,14 +160,14 @@ NUMBERS = {
 
 
 def test_resolve_takes_the_first_unit_or_the_one_asked_for():
-    assert resolve(NUMBERS)[1] == "mm"
-    plain, unit = resolve(NUMBERS, "m")
+    assert in_one_unit(NUMBERS)[1] == "mm"
+    plain, unit = in_one_unit(NUMBERS, "m")
     assert unit == "m"
     assert [plain[name] for name in NUMBERS] == pytest.approx(
         [0.8, 6283.0, 100, 0.8e-6, 2.4e-6], rel=1e-15
     )
     # plain numbers are in the unit asked for
-    assert resolve({"h_rms": 2.0, "h_max": "6 mm"}, "um") == (
+    assert in_one_unit({"h_rms": 2.0, "h_max": "6 mm"}, "um") == (
         {"h_rms": 2.0, "h_max": 6000.0},
         "um",
     )
@@ -175,7 +175,7 @@ def test_resolve_takes_the_first_unit_or_the_one_asked_for():
         InputError,
         match="h_max without a unit beside numbers in um: write the unit to each",
     ):
-        resolve({"h_rms": "2 um", "h_max": 6.0})
+        in_one_unit({"h_rms": "2 um", "h_max": 6.0})
 
 
 CONCRETE = Surface.named("concrete")

@@ -33,7 +33,7 @@ from mbma_tables.common.arguments import (
 )
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.common.units import Units, factor, resolve
+from mbma_tables.common.units import Units, factor, in_one_unit
 
 # plasticity index E* g/p_m up to which elastic areas are within 5% of those with a hardness
 ELASTIC_PSI = 1.1
@@ -122,7 +122,7 @@ def effective_modulus(
     >>> effective_modulus("200 GPa", 0.0, "50 GPa", 0.0)
     '40.0 GPa'
     """
-    plain, unit = resolve({"E1": E1, "nu1": nu1, "E2": E2, "nu2": nu2}, kind="stress")
+    plain, unit = in_one_unit({"E1": E1, "nu1": nu1, "E2": E2, "nu2": nu2}, kind="stress")
     moduli = [positive_array(name, plain[name]) for name in ("E1", "E2")]
     ratios = [_poisson(name, plain[name]) for name in ("nu1", "nu2")]
     broadcast_shape(E1=moduli[0], nu1=ratios[0], E2=moduli[1], nu2=ratios[1])
@@ -629,7 +629,7 @@ def tangential_ratio(
     if E is None:
         return np.asarray(above / below)[()]
     modulus = positive_array(
-        "E", list(resolve({"E1": E[0], "E2": E[1]}, kind="stress")[0].values())
+        "E", list(in_one_unit({"E1": E[0], "E2": E[1]}, kind="stress")[0].values())
     )
     compliance = (1 + ratio) / modulus  # 1/(2 G)
     return (above * compliance).sum(axis=-1) / (below * compliance).sum()

@@ -291,7 +291,7 @@ def _conductivity_per_metre(value: Any) -> tuple[float, str]:
 UNKNOWN = Units()
 
 
-def resolve(
+def in_one_unit(
     quantities: Mapping[str, Any], requested_unit: str | None = None, kind: str = "length"
 ) -> tuple[dict[str, Any], str | None]:
     """Numbers in one unit of length or stress, and that unit: as requested, else the first."""

@@ -28,6 +28,7 @@ from mbma_tables.contacts.result import Contact, Setup
 from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
 from mbma_tables.theories import resolve
 from mbma_tables.theories.base import (
+    Gaps,
     Solved,
     Theory,
     UserTheory,
@@ -146,7 +147,8 @@ def contact_of(
         "pressure": solved.pressure,
         "area": solved.area,
         "error": solved.error,
-        **gaps,
+        "separation": gaps.separation[()],
+        "mean_separation": gaps.mean_separation[()],
     }
     return Contact(setup, values, solved.islands, solved.answer, solved.loaded)
 
@@ -157,7 +159,7 @@ def _solved(
     question: Question,
     E_star: Any,
     hardness: Any,
-) -> tuple[Solved, dict[str, Any]]:
+) -> tuple[Solved, Gaps]:
     """The contact of plain arrays at a given quantity, and its separations.
 
     Modulus and hardness are checked already.
@@ -177,10 +179,8 @@ def _solved(
     theory = setup.theory
     if setup.bodies.yields:
         theory = with_hardness(theory, cap, modulus)
-    gaps, lighter = _separations(setup, theory, surface, question, modulus, cap)
-    d = np.asarray(gaps["separation"])
-    u = np.asarray(gaps["mean_separation"])
-    return theory.solved(surface, d, u, modulus, lighter), gaps
+    gaps = _separations(setup, theory, surface, question, modulus, cap)
+    return theory.solved(surface, gaps, modulus), gaps
 
 
 def _separations(
@@ -190,8 +190,8 @@ def _separations(
     question: Question,
     modulus: FloatArray,
     cap: FloatArray,
-) -> tuple[dict[str, Any], Any]:
-    """Both separations for the given quantity; also `lighter` of `Theory.at_force`."""
+) -> Gaps:
+    """Both separations for the given quantity."""
     h_max = np.asarray(surface.h_max)
     name = question.name
     gap = question.value
@@ -212,7 +212,7 @@ def _separations(
     d, u = both_separations(name, gap, h_max, theory.ends_at_h_max)
     if is_gap:
         require_domain(theory, surface, name, gap, u)
-    return {"separation": d[()], "mean_separation": u[()]}, lighter
+    return Gaps(np.asarray(d), np.asarray(u), lighter)
 
 
 def _inverted(
@@ -277,7 +277,8 @@ def _of_labelled(setup: Setup, question: Question) -> Contact:
         modulus = positive_array("E_star", E_star)
         cap = checked_hardness(hardness)
         solved, gaps = _solved(setup, block, question.of_block(given), modulus, cap)
-        return (*gaps.values(), solved.pressure, solved.area, solved.error)
+        answer = solved.pressure, solved.area, solved.error
+        return (gaps.separation, gaps.mean_separation, *answer)
 
     name = question.name
     value = question.value

@@ -10,7 +10,7 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray, nearest, number_in, require_flag
 from mbma_tables.common.errors import InputError, NotSelfAffineError, OutOfRangeError
-from mbma_tables.common.units import Units, factor, known, resolve
+from mbma_tables.common.units import Units, factor, in_one_unit, known
 from mbma_tables.surfaces import bearing_curve as bearing
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.measurements import grid_of, read_measurement
@@ -88,7 +88,7 @@ def prepared(
         require_flag("periodic", stated["periodic"])
     names: list[str] = [name for name in ("dx", "dy") if name in stated]
     steps_of_array = {name: stated.pop(name) for name in names}
-    lengths, unit = resolve(steps_of_array, stated.pop("unit", None))
+    lengths, unit = in_one_unit(steps_of_array, stated.pop("unit", None))
     channel = stated.pop("channel", None)
     periodic = stated.pop("periodic", None)
     if isinstance(source, str | os.PathLike):

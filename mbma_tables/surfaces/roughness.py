@@ -27,7 +27,7 @@ from mbma_tables.common.arguments import (
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.common.shared import shared
-from mbma_tables.common.units import resolve
+from mbma_tables.common.units import in_one_unit
 from mbma_tables.surfaces import spectrum
 
 HEIGHTS = ("Rq", "Ra", "Sq", "Sa")
@@ -141,7 +141,7 @@ def surface_of_roughness(
     """Arguments of `Surface` from numbers of a drawing; see `Surface.from_roughness`."""
     of_process = record_of_process(process)
     stated = {name: value for name, value in numbers.items() if value is not None}
-    stated, unit = resolve(stated, unit)
+    stated, unit = in_one_unit(stated, unit)
     height = _one_of(HEIGHTS, stated, "the height of roughness")
     slope = _one_of(SLOPES, stated, "the slope of roughness")
     top = _one_of(TOPS, stated, "the highest point")

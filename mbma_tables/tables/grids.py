@@ -1,4 +1,4 @@
-"""A table's results on a grid of the reader's axes as an xarray Dataset."""
+"""What the models of shipped tables share: their content, and results on a grid as an xarray Dataset."""
 
 from __future__ import annotations
 
@@ -34,6 +34,19 @@ OUTSIDE_MEANS = {
     "exact": "the exact solver where the table does not cover the island",
     "raise": "no island outside the table",
 }
+
+
+class OfTable:
+    """A model of islands that is its table: pickled and shown by the table's content."""
+
+    def __init__(self, content: TableContent) -> None:
+        self.content = content
+
+    def __reduce__(self) -> tuple[type[OfTable], tuple[TableContent]]:
+        return type(self), (self.content,)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.content.describe()})"
 
 
 def on_grid(

@@ -21,7 +21,7 @@ from mbma_tables.common.shared import shared_property
 from mbma_tables.core import core
 from mbma_tables.islands.island_models import SOLVER, IslandAnswer, check_outside
 from mbma_tables.islands.variants import Variant, get_variant
-from mbma_tables.tables.grids import on_grid
+from mbma_tables.tables.grids import OfTable, on_grid
 from mbma_tables.tables.schema import Axis, TableContent
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ class Lookup(NamedTuple):
     error: Any
 
 
-class Island4dModel:
+class Island4dModel(OfTable):
     """F_hat and A_hat by the paper's four numbers, from a four-parameter table alone.
 
     Parameters
@@ -117,12 +117,9 @@ class Island4dModel:
     name = "island4d"
 
     def __init__(self, content: TableContent) -> None:
-        self.content = content
+        super().__init__(content)
         self.variant = get_variant(content.attributes["variant"])
         self._X, self._spread, _, self._hurst = content.axes
-
-    def __reduce__(self) -> tuple[type[Island4dModel], tuple[TableContent]]:
-        return type(self), (self.content,)
 
     @shared_property
     def _core_table(self) -> tuple[Any, ...]:
@@ -133,9 +130,6 @@ class Island4dModel:
     def _one(self) -> Any:
         """Of one island of four floats its lookup, None outside the table and for other types."""
         return core.Table(*self._core_table).at
-
-    def __repr__(self) -> str:
-        return f"Island4dModel({self.content.describe()})"
 
     def lookup(
         self,

@@ -25,7 +25,7 @@ from mbma_tables.islands.island_models import (
     IslandAnswer,
     check_outside,
 )
-from mbma_tables.tables.grids import on_grid
+from mbma_tables.tables.grids import OfTable, on_grid
 from mbma_tables.tables.schema import BUCKET_BITS, CELL_EDGES, X_STEPS, TableContent
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ class Ranged:
         return self.answer(islands["X"], islands["mu"], outside=outside)
 
 
-class UniversalModel(Ranged):
+class UniversalModel(OfTable, Ranged):
     """Phi_F and Phi_A from a universal table.
 
     Parameters
@@ -106,12 +106,9 @@ class UniversalModel(Ranged):
     name = "universal"
 
     def __init__(self, content: TableContent) -> None:
-        self.content = content
+        super().__init__(content)
         self._X, self._mu = content.axes
         self.ranges = {"X": (self._X.low, self._X.high), "mu": (0.0, self._mu.high)}
-
-    def __reduce__(self) -> tuple[type[UniversalModel], tuple[TableContent]]:
-        return type(self), (self.content,)
 
     @shared_property
     def _one(self) -> Any:
@@ -150,9 +147,6 @@ class UniversalModel(Ranged):
         """
         check_outside(outside)
         return on_grid(self.content, {"X": X, "mu": mu}, self.answer, outside)
-
-    def __repr__(self) -> str:
-        return f"UniversalModel({self.content.describe()})"
 
     def _rows(self, X: FloatArray, mu: FloatArray) -> FloatArray:
         out = np.empty((X.size, 3))

@@ -48,6 +48,14 @@ class TheoryAnswer(NamedTuple):
     error: FloatArray
 
 
+class Gaps(NamedTuple):
+    """Both separations of contacts [length], and what a theory found with them."""
+
+    separation: FloatArray  # d
+    mean_separation: FloatArray  # u
+    lighter: Any = None  # from `Theory.at_force`, where gaps were found at forces
+
+
 class Solved(NamedTuple):
     """Contacts at known gaps, and what the theory found beside them."""
 
@@ -183,16 +191,9 @@ class Theory(abc.ABC):
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Pressure, area and stiffness at mean separations u [length]."""
 
-    def solved(
-        self,
-        surface: AnySurface,
-        separation: FloatArray,
-        mean_separation: FloatArray,
-        modulus: FloatArray,
-        lighter: Any = None,
-    ) -> Solved:
-        """Contacts at gaps of which both separations are known; `lighter` is that of `at_force`."""
-        answer = self.answer(surface, mean_separation)
+    def solved(self, surface: AnySurface, gaps: Gaps, modulus: FloatArray) -> Solved:
+        """Contacts at known gaps."""
+        answer = self.answer(surface, gaps.mean_separation)
         return solved_by(answer, modulus)
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.netcdf import is_own
 from mbma_tables.common.plain_text import visible
 from mbma_tables.common.toml_files import check, read_toml
-from mbma_tables.common.units import Units, factor, in_unit, known, resolve
+from mbma_tables.common.units import Units, factor, in_one_unit, in_unit, known
 from mbma_tables.design.scenes.problem import effects
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import ROUGHNESS
@@ -137,7 +137,7 @@ def from_numbers(
             f"a surface needs {', '.join(PARAMETERS)} (or zeta_1 for q1), or {', '.join(MOMENTS)}, or "
             f"roughness (Rq, ...), with h_max or nominal_area; got {', '.join(given) or 'none of them'}"
         )
-    plain, unit = resolve(given, unit)
+    plain, unit = in_one_unit(given, unit)
     numbers = {key: one_number(key, value) for key, value in plain.items()}
     if "m0" in numbers:
         return Specimen(Surface.from_moments(**numbers, unit=unit), title)
@@ -157,7 +157,7 @@ def effective_modulus_of(
     given: Mapping[str, Any], unit: str | None = None
 ) -> tuple[float | None, str | None]:
     """E* from a material's numbers, None if there are none, and its unit: the one given, or the first named."""
-    plain, unit = resolve(given, unit, "stress")
+    plain, unit = in_one_unit(given, unit, "stress")
     if not given:
         return None, unit
     numbers = {key: one_number(key, value) for key, value in plain.items()}

@@ -25,6 +25,7 @@ from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories.base import (
     EVERYWHERE,
     Compression,
+    Gaps,
     Solved,
     Theory,
     TheoryAnswer,
@@ -131,16 +132,9 @@ class Mbma(Theory):
             check_band(surface, self.variant)
         return totals_at(surface, gap, self.sums, E_star, slopes)
 
-    def solved(
-        self,
-        surface: AnySurface,
-        separation: FloatArray,
-        mean_separation: FloatArray,
-        modulus: FloatArray,
-        lighter: Any = None,
-    ) -> Solved:
+    def solved(self, surface: AnySurface, gaps: Gaps, modulus: FloatArray) -> Solved:
         """Totals at separations d, the model's own coordinate, without their slopes."""
-        totals = self.totals(surface, separation, modulus)
+        totals = self.totals(surface, gaps.separation, modulus)
         return Solved(totals.pressure, totals.area, totals.error, islands=totals.islands)
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:

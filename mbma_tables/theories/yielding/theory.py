@@ -15,7 +15,14 @@ from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import tested
-from mbma_tables.theories.base import Solved, Theory, TheoryAnswer, solved_by, unfinished
+from mbma_tables.theories.base import (
+    Gaps,
+    Solved,
+    Theory,
+    TheoryAnswer,
+    solved_by,
+    unfinished,
+)
 from mbma_tables.theories.evidence import known_at, shipped_part
 from mbma_tables.theories.inversion import FEW_LOOKS, Curve
 from mbma_tables.theories.yielding import formulas as law
@@ -190,16 +197,9 @@ class Yielding(Theory):
         """Force, area and the loading curve's stiffness at mean separations u [length]."""
         return self.loaded(surface, mean_separation).answer
 
-    def solved(
-        self,
-        surface: AnySurface,
-        separation: FloatArray,
-        mean_separation: FloatArray,
-        modulus: FloatArray,
-        lighter: Any = None,
-    ) -> Solved:
+    def solved(self, surface: AnySurface, gaps: Gaps, modulus: FloatArray) -> Solved:
         """Contacts at gaps; `lighter` are those of the elastic contact at the same forces."""
-        loaded = self.loaded(surface, mean_separation, lighter)
+        loaded = self.loaded(surface, gaps.mean_separation, gaps.lighter)
         return solved_by(loaded.answer, modulus, loaded)
 
     def provenance(self) -> tuple[str, ...]:
