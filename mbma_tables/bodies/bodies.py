@@ -228,6 +228,8 @@ class BodiesInUnits:
     E_star: Any
     hardness: Any  # infinite where nothing yields
     units: Units
+    #: mean conductivity in place of that of `bodies`, as `conductivity` has it
+    k_s: Any = None
 
     @property
     def pair(self) -> Pair | None:
@@ -275,6 +277,8 @@ class BodiesInUnits:
                 f"conductivity is of both bodies or of each: one or two, got {len(each)}"
             )
         numbers, unit = self.units.conductivities(*each)
+        if self.k_s is not None:
+            return self.k_s, unit
         return mean_conductivity(*numbers), unit
 
     @property

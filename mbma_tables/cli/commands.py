@@ -174,7 +174,7 @@ def curve_command(
 
 
 @click.command("sensitivity", short_help="Sensitivity of results to each parameter.")
-@options.load_options(options.quantity_option)
+@options.load_options(options.numbers_option)
 @options.results_option
 @options.conductivity_option
 @options.specimen_options
@@ -194,34 +194,50 @@ def sensitivity_command(
     the scales of its heights and lengths; of a spectrum also h_max, cut-offs and the
     exponent of an extrapolation.
 
+    Several pressures have a table each.
+
     Example: mbma sensitivity --surface concrete --E-star 13.3MPa -p 100kPa
     """
     from mbma_tables.contacts.question import name_of_the_given
     from mbma_tables.design.sensitivity import sensitivity
 
-    given = dict.fromkeys(options.LOADS) | loads
+    given = dict.fromkeys(options.LOADS) | {
+        name: values[0] if len(values) == 1 else values for name, values in loads.items()
+    }
     model = model.of(specimen.surface, name_of_the_given(given))
     found = sensitivity(
         specimen.surface,
         model.bodies(specimen, conductivity),
         theory=model.theory,
         quantities=quantity,
-        **loads,
+        **given,
     )
     units = {
         name: column_unit(found.unit(name))
         for name in (*found.parameters, *found.answers)
     }
     if as_json:
-        echo(to_json(vars(found) | {"theory": model.theory.name, "units": units}))
+        content = {
+            "by": found.by,
+            "parameters": found.parameters,
+            "answers": found.answers,
+            "slopes": found.slopes,
+            "errors": found.errors,
+            "derivatives": found.derivatives,
+            "sides": found.sides,
+            "theory": model.theory.name,
+            "units": units,
+        }
+        echo(to_json(content))
         return
-    here = ", ".join(
-        f"{name} {value:.6g} {units[name]}".removesuffix(" -")
-        for name, value in found.answers.items()
-    )
-    echo(
-        f"mbma sensitivity: {specimen.title}, theory {model.theory.name}\nhere: {here}\n\n{found}"
-    )
+    head = f"mbma sensitivity: {specimen.title}, theory {model.theory.name}"
+    if found.shape == ():
+        here = ", ".join(
+            f"{name} {value:.6g} {units[name]}".removesuffix(" -")
+            for name, value in found.answers.items()
+        )
+        head += f"\nhere: {here}"
+    echo(f"{head}\n\n{found}")
 
 
 @click.command("island", short_help="Contact islands at given approaches.")

@@ -141,9 +141,8 @@ class Report:
 
 def to_json(content: Any) -> str:
     """JSON, with null in place of missing numbers."""
-    return json.dumps(
-        json.loads(json.dumps(content), parse_constant=lambda _: None), indent=2
-    )
+    plain = json.dumps(content, default=lambda array: array.tolist())
+    return json.dumps(json.loads(plain, parse_constant=lambda _: None), indent=2)
 
 
 def _rounded(value: Any) -> str:

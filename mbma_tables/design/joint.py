@@ -6,14 +6,14 @@ import dataclasses
 import functools
 import os
 import pathlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.bodies.bodies import Bodies, BodiesInUnits, is_array, names_metals
-from mbma_tables.bodies.materials import Pair, effective_modulus, tangential_ratio
+from mbma_tables.bodies.materials import Pair, tangential_ratio
 from mbma_tables.common.arguments import (
     FloatArray,
     any_labelled,
@@ -55,13 +55,9 @@ from mbma_tables.contacts.quantities.tangential import (
     ratio_on,
 )
 from mbma_tables.contacts.result import Contact
-from mbma_tables.design.sensitivity import (
-    OfOneMap,
-    Sensitivity,
-    Unknowns,
-    relative_derivatives,
-    unknowns_of,
-)
+from mbma_tables.design.body_numbers import BodyNumbers
+from mbma_tables.design.derivatives import Described
+from mbma_tables.design.sensitivity import Sensitivity, sensitivity_of
 from mbma_tables.design.uncertainty import (
     DRAWS,
     LEVELS,
@@ -75,6 +71,7 @@ from mbma_tables.design.uncertainty import (
     require_inputs,
     uncertainty_of,
 )
+from mbma_tables.design.unknowns import OfOneMap, Unknowns, unknowns_of
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import TOPS
 from mbma_tables.surfaces.surface import Surface, assumptions
@@ -118,8 +115,8 @@ class Joint(JointQuantities, Displayed):
 
     Numbers of the parts, `nominal_area`, constants in `Bodies` and those of the gas may be
     arrays, which broadcast to a batch of joints: quantities of `at_pressure` then have the
-    broadcast shape, with that of the pressures. Tables, plots, laws, sensitivities and
-    exports are of one joint.
+    broadcast shape, with that of the pressures. Tables, plots, laws and exports are of one
+    joint.
 
     Parameters
     ----------
@@ -586,14 +583,15 @@ class Joint(JointQuantities, Displayed):
         return law_of(self.surface, self.bodies, self.theory, None, self.interface)
 
     def sensitivity(
-        self, pressure: float | str, quantities: Sequence[str] | None = None
+        self, pressure: ArrayLike | str, quantities: Sequence[str] | None = None
     ) -> Sensitivity:
-        """d ln(result)/d ln(number) at a pressure, for the numbers that the joint was described by.
+        """Quantities at a pressure and their derivatives by the numbers that the joint was described by.
 
         Parameters
         ----------
-        pressure : float or str
-            F/A0, held fixed; plain numbers in the unit of the modulus.
+        pressure : array_like or str
+            F/A0, held fixed; plain numbers in the unit of the modulus. It broadcasts with
+            the arrays of the joint.
         quantities : sequence of str, optional
             As for `sensitivity`; by default with the conductances of the joint.
 
@@ -601,9 +599,11 @@ class Joint(JointQuantities, Displayed):
         -------
         Sensitivity
             With a row for each number of each face, "part_a.Rq", "part_a.longest"; Young's
-            moduli of both bodies, "part_a.E" and "part_b.E"; the nominal area, the hardness
-            of the softer metal, and the pressure. Of a face given by a spectrum or a map as
-            for `sensitivity`: "part_a.heights", "part_a.lengths", its cut-offs.
+            moduli, Poisson's ratios and conductivities of both bodies, "part_a.E",
+            "part_b.nu"; the nominal area, the hardness of the softer metal, the pressure,
+            and the "temperature", "gas_pressure" and "accommodation" of a gas that is not
+            given by its name alone. Of a face given by a spectrum or a map as for
+            `sensitivity`: "part_a.heights", "part_a.lengths", its cut-offs.
 
         Raises
         ------
@@ -620,34 +620,21 @@ class Joint(JointQuantities, Displayed):
         >>> f"conductance goes like Rq^{slopes['part_a.Rq']['solid_conductance']:.2f}"
         'conductance goes like Rq^-0.67'
         """
-        self.require_one("a sensitivity")
-        in_units = self._in_units
+        self.require_known("a sensitivity")
+        return sensitivity_of(self.described("pressure", pressure), quantities)
+
+    def described(self, by: str, value: Any) -> Described:
+        """All numbers of the joint and the quantity at which it is asked for, for derivatives by each."""
         chosen = resolve(self.theory, self.surface)
-        moduli, modulus_of = self._moduli(in_units)
-        return relative_derivatives(
+        in_units = self._in_units
+        return Described.of(
+            self.surface,
             self._unknowns(chosen),
+            BodyNumbers.of(in_units, self.interface, isinstance(self.gas, str)),
             chosen,
-            in_units,
-            moduli=moduli,
-            modulus_of=modulus_of,
-            by="pressure",
-            value=in_units.units.number("pressure", pressure),
-            quantities=quantities,
-            interface=self.interface,
+            by,
+            self._spread(by, value),
         )
-
-    def _moduli(
-        self, in_units: BodiesInUnits
-    ) -> tuple[dict[str, Any], Callable[..., Any]]:
-        """Young's moduli of named metals, or the effective modulus, and E* as their function."""
-        if self.pair is None:
-            return {"E_star": in_units.E_star}, lambda E_star: E_star
-        metal_a, metal_b = self.pair.metals
-
-        def modulus_of(E_a: Any, E_b: Any) -> Any:
-            return effective_modulus(E_a, metal_a.nu, E_b, metal_b.nu)
-
-        return {"part_a.E": metal_a.E, "part_b.E": metal_b.E}, modulus_of
 
     def _unknowns(self, theory: Theory) -> Unknowns:
         """The numbers of the faces, each with the name of its part before it, and the nominal area."""
