@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,22 +13,18 @@ import click
 
 from mbma_tables.bodies.materials import tangential_ratio
 from mbma_tables.cli import options
+from mbma_tables.cli.options import given_values
 from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import MAX_BYTES, read_file, write_file
 from mbma_tables.common.progress import echo
 from mbma_tables.design.scenes.specimen import Specimen
-from mbma_tables.export.targets import (
-    OPTIONS,
-    Target,
-    require_quantity,
-    targets,
-    write_files,
-)
+from mbma_tables.export.targets import Options, Target, targets, write_files
 from mbma_tables.export.text import written_by
 
 if TYPE_CHECKING:
     from mbma_tables.export.law_table import LawTable
+    from mbma_tables.export.request import Subject
 
 DEFAULTS = {"variant": "reported", "check": False}
 
@@ -52,6 +49,18 @@ class _Export(click.Command):
     type=click.Path(path_type=Path),
     help="File to write; a folder for source code.",
 )
+@click.option(
+    "--joint",
+    type=click.Path(path_type=Path),
+    metavar="TOML",
+    help="In place of a surface: the file of a joint.",
+)
+@click.option(
+    "--law",
+    type=click.Path(path_type=Path),
+    metavar="FILE.json",
+    help="In place of a surface: rows that `mbma export json` wrote, for other programs.",
+)
 @options.optional_specimen_options
 @options.file_options
 @click.option(
@@ -75,11 +84,6 @@ class _Export(click.Command):
     type=float,
     help="Coefficient for friction cards, whose stiffness before slip needs --nu.",
 )
-@click.option(
-    "--direction",
-    metavar="x|y|DEGREES",
-    help="Of leakage of a map; else the mean of both axes.",
-)
 @options.theory_option
 @options.hardness_option
 @options.variant_option
@@ -102,74 +106,156 @@ def export_command(target: str, out: Path, asked: dict[str, Any], **values: Any)
     Example: mbma export calculix --surface concrete --E-star 13.3MPa --out law.inp
     """
     require_name("target", target, targets())
+    kind = targets()[target]
+    code = target in targets("CODE")
+    surface = values.pop("specimen")
     given = {
         name: value
         for name, value in values.items()
         if value is not None and value != DEFAULTS.get(name)
     } | asked
-    kind = targets()[target]
-    code = target in targets("CODE")
-    _refuse_unused(kind, given, code)
-    if "direction" in given and "leakage" not in given:
-        raise InputError("--direction is of leakage: add --leakage or leave it out")
+    sources = [name for name in ("joint", "law") if given.pop(name, None) is not None]
+    if given_values(surface) and not sources:
+        sources.append("specimen")
+    _refuse_unused(kind, [*given, *(sources if code else ())], code)
     if code:
         _export_code(out, values["variant"], values["table"], "check" in given)
         return
-    specimen = _checked_specimen(given.pop("specimen", None))
-    if kind.units is not None:
-        specimen = specimen.in_units(*kind.units)
-    file_name = None if str(out) == "-" else out
-    named, line_of_name = kind.place_of_name(given.pop("name", None), file_name)
-    law: dict[str, Any] = {
-        name: getattr(specimen, name) for name in ("surface", "E_star", "stress_unit")
-    }
-    law["made_by"] = (*line_of_name, *_inputs(), written_by(_context().obj[1:]))
-    if kind.rows:
-        files = kind.files(_rows(kind, law | given), **named)
+    subject: Subject | list[LawTable]
+    made_by = (*_inputs(), written_by(_context().obj[1:]))
+    units: dict[str, Any] = {}
+    if sources in (["joint"], ["law"]):
+        units = _units_alone(surface, sources[0])
+        _refuse_of_surface(given, sources[0])
+        subject = (
+            _subject_of_joint(values["joint"])
+            if sources == ["joint"]
+            else _rows_of_file(values["law"])
+        )
+    elif len(sources) == 2:
+        raise InputError("--joint and --law are both given: give one of them")
     else:
-        files = kind.files(**law, **given, **named)
-    show_written(kind, out, files)
+        subject = _subject_of_surface(kind, surface, given)
+    request = Options(**asked, **units, made_by=made_by)
+    write_export(subject, target, request, out)
 
 
 def _context() -> click.Context:
     return click.get_current_context()
 
 
-def _refuse_unused(kind: Target, given: Mapping[str, Any], code: bool) -> None:
+def _word(name: str) -> str:
+    """The option of an argument."""
+    words = {"specimen": "the surface", "kappa": "--nu", "heat": "--without-heat"}
+    return words.get(name, f"--{name.replace('_', '-')}")
+
+
+def _refuse_unused(kind: Target, given: Iterable[str], code: bool = False) -> None:
     """Refuse options without effect."""
-    words = {"specimen": "the surface", "kappa": "--nu"}
-    taken = kind.takes if code else kind.takes | {"specimen", "name"}
-    unused = [
-        words.get(name, f"--{name.replace('_', '-')}")
-        for name in sorted(given)
-        if name not in taken
-    ]
+    taken = (
+        kind.takes
+        if code
+        else kind.takes | {"name", "heat", "length_unit", "stress_unit"}
+    )
+    unused = [_word(name) for name in sorted(given) if name not in taken]
     if unused:
         raise InputError(
             f"without effect on {kind.name}: leave {' and '.join(unused)} out"
         )
 
 
-def _checked_specimen(specimen: Specimen | None) -> Specimen:
-    if specimen is None:
+def _units_alone(surface: Mapping[str, Any], source: str) -> dict[str, Any]:
+    """Units of a file, which are the options of a surface that have a meaning without one."""
+    given = given_values(surface)
+    units: dict[str, Any] = {}
+    for name in ("length_unit", "stress_unit"):
+        if name in given:
+            units[name] = given.pop(name)
+    if given:
+        words = " and ".join(_word(name) for name in given)
+        raise InputError(f"--{source} has the surface: leave {words} out")
+    return units
+
+
+def _refuse_of_surface(given: Mapping[str, Any], source: str) -> None:
+    """Refuse options of a surface's bodies and theory beside a file that has them."""
+    bodies = ("conductivity", "conductivity_unit", "kappa", "friction", "hardness")
+    names = (*bodies, "theory", "variant")
+    words = [_word(name) for name in names if name in given]
+    if words:
+        raise InputError(f"--{source} has its own: leave {' and '.join(words)} out")
+
+
+def _subject_of_joint(path: Path) -> Subject:
+    from mbma_tables.design.joint import Joint
+
+    return Joint.from_toml(path).subject()
+
+
+def _rows_of_file(path: Path) -> list[LawTable]:
+    from mbma_tables.export.rows.data import from_json
+
+    return from_json(read_file(path, MAX_BYTES))
+
+
+def _subject_of_surface(
+    kind: Target, surface: Mapping[str, Any], given: Mapping[str, Any]
+) -> Subject:
+    """A surface and the bodies that the options describe."""
+    from mbma_tables.export.request import Subject, given_heat
+
+    if not given_values(surface):
         raise InputError(
-            "one surface is needed: see the options --surface, --file, --map, --hurst"
+            "one surface is needed: see the options --surface, --file, --map, --hurst; or a --joint, or a --law"
         )
+    specimen = options.specimen_of(surface)
     if specimen.E_star is None:
         raise InputError("a modulus is needed: --E-star, or all of --E1 --nu1 --E2 --nu2")
-    return specimen
+    if kind.units is not None:
+        specimen = specimen.in_units(*kind.units)
+    numbers = given.get("conductivity"), given.get("conductivity_unit")
+    return Subject(
+        surface=specimen.surface,
+        E_star=specimen.modulus,
+        stress_unit=specimen.stress_unit,
+        theory=given.get("theory"),
+        variant=given.get("variant", "reported"),
+        hardness=given.get("hardness", math.inf),
+        heat=None if numbers == (None, None) else given_heat(*numbers),
+        kappa=given.get("kappa"),
+        friction=given.get("friction"),
+    )
 
 
 def _inputs() -> Iterator[str]:
     """Lines of a header with the files that were read, and their digests."""
     asked = _context().params
-    inputs = [asked[key] for key in ("file", "map") if asked[key]]
+    inputs = [asked[key] for key in ("file", "map", "joint", "law") if asked[key]]
     for path in [path for path in inputs if path.suffix == ".toml"]:
         table = tomllib.loads(read_file(path, MAX_BYTES).decode()).get("surface", {})
         inputs += [path.parent / table["map"]] if "map" in table else []
     for path in inputs:
         digest = hashlib.sha256(read_file(path, MAX_BYTES)).hexdigest()
         yield f"input {path}: sha256 {digest}"
+
+
+def write_export(
+    subject: Subject | list[LawTable], target: str, request: Options, out: Path
+) -> None:
+    """Write a subject for a program, and say at which of the pressures asked for it is not valid."""
+    from mbma_tables.export.request import files_of
+
+    require_name("target", target, targets())
+    kind = targets()[target]
+    if target not in targets("CODE"):
+        _refuse_unused(kind, request.of_some_targets())
+    to_screen = str(out) == "-"
+    if to_screen:
+        require_alone(kind)
+    written = files_of(subject, target, request, None if to_screen else out)
+    for line in written.doubts:
+        echo(line, err=True)
+    show_written(kind, out, written.files)
 
 
 def show_written(kind: Target, out: Path, files: Mapping[str, bytes]) -> None:
@@ -182,66 +268,20 @@ def show_written(kind: Target, out: Path, files: Mapping[str, bytes]) -> None:
 
 
 def write_first(kind: Target, content: bytes) -> None:
-    """Write the first file of a target to standard output, and name those that are left out.
-
-    Raises
-    ------
-    InputError
-        Where the first file needs the others.
-    """
+    """Write the first file of a target to standard output, and name those that are left out."""
     beside = ", ".join(f"NAME{end}" for end in kind.beside)
-    if not kind.alone:
-        raise InputError(
-            f"{kind.name} is several files, of which the first needs {beside}: --out FILE writes all"
-        )
     write_file(Path("-"), content)
     if beside:
         echo(f"left out: {beside}; --out FILE writes all", err=True)
 
 
-def _rows(target: Target, asked: dict[str, Any]) -> LawTable | list[LawTable]:
-    """Rows of each quantity; requested pressures at which they are not valid are reported."""
-    heat = (
-        "solid_conductance"
-        if asked.keys() & {"conductivity", "conductivity_unit"}
-        else target.quantity
-    )
-    leakage = asked.pop("leakage", False)
-    names = asked.pop("quantity", ["leakage" if leakage else heat])
-    for name in names:
-        require_quantity(name)
-    if len(names) > 1 and not target.several:
-        raise InputError(f"{target.name} has one quantity a file: give one of {names}")
-    laws = []
-    for name in names:
-        of_others: set[str] = set()
-        for other in names:
-            of_others |= OPTIONS.get(other, set())
-        of_others -= OPTIONS.get(name, set())
-        own = {key: value for key, value in asked.items() if key not in of_others}
-        laws.append(_rows_of(target, name, own))
-    return laws[0] if len(laws) == 1 else laws
-
-
-def _rows_of(target: Target, quantity: str, asked: dict[str, Any]) -> LawTable:
-    from mbma_tables.export.rows.law_rows import describe_law
-
-    asked = asked | {"quantity": quantity, "most_rows": target.most.get(quantity)}
-    # of Lethe, whose numbers do not depend on the conductivity
-    if target.quantity == "solid_conductance":
-        asked = {"conductivity": 1.0, "conductivity_unit": "W/(m K)"} | asked
-    law = describe_law(**asked)
-    if "pressures" not in asked:
-        return law
-    rows = law.behaviour or law
-    for line in rows.comments:
-        # a limit below the smallest requested pressure does not matter
-        below = line.startswith("not valid below") and rows.y_name == "pressure"
-        if line.startswith("not valid") and not (
-            below and float(line.split("p = ")[1].split()[0]) <= rows.floor
-        ):
-            echo(line, err=True)
-    return law
+def require_alone(kind: Target) -> None:
+    """Refuse standard output where the first file of a target needs the others."""
+    if not kind.alone:
+        beside = ", ".join(f"NAME{end}" for end in kind.beside)
+        raise InputError(
+            f"{kind.name} is several files, of which the first needs {beside}: --out FILE writes all"
+        )
 
 
 def _export_code(folder: Path, variant: str, table: str | None, check: bool) -> None:

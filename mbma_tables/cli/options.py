@@ -170,7 +170,7 @@ def given_values(values: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def _specimen(given: Mapping[str, Any]) -> Specimen:
+def specimen_of(given: Mapping[str, Any]) -> Specimen:
     """The surface that the options describe, with its modulus; a modulus option overrides that of a file."""
     length = given["length_unit"]
     stress = given["stress_unit"]
@@ -303,7 +303,7 @@ _SPECIMEN_OPTIONS = (
     stress_unit_option,
 )
 map_options = option_group("treatment", given_values, *_MAP_OPTIONS, length_unit("unit"))
-specimen_options = option_group("specimen", _specimen, *_SPECIMEN_OPTIONS)
+specimen_options = option_group("specimen", specimen_of, *_SPECIMEN_OPTIONS)
 
 
 def _pair(ctx: click.Context, param: click.Parameter, given: str | None) -> Any:
@@ -357,6 +357,18 @@ file_options = option_group(
         help="Flow coefficient of the gaps: rows of it alone, laws as code with it.",
     ),
     click.option(
+        "--direction",
+        metavar="x|y|DEGREES",
+        help="Of leakage of a map; else the mean of both axes.",
+    ),
+    click.option(
+        "--without-heat",
+        "heat",
+        flag_value=False,
+        default=None,
+        help="Leave conductance out.",
+    ),
+    click.option(
         "--peklenik",
         type=float,
         help="Of a film: length of the roughness along x over that along y.",
@@ -367,12 +379,8 @@ file_options = option_group(
         help="In an FMU: for this platform, for all by zig, or none.",
     ),
 )
-# None where none of them is given
-optional_specimen_options = option_group(
-    "specimen",
-    lambda given: _specimen(given) if given_values(given) else None,
-    *_SPECIMEN_OPTIONS,
-)
+# of a command that takes a surface or something else: as they were given
+optional_specimen_options = option_group("specimen", dict, *_SPECIMEN_OPTIONS)
 
 
 def load_options(option: Callable[..., Decorator]) -> Decorator:

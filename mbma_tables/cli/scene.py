@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from mbma_tables.cli.export import write_first
+from mbma_tables.cli.export import write_export
 from mbma_tables.cli.format import (
     Report,
     assumption_notes,
@@ -34,7 +34,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import MAX_BYTES, read_file, write_file, written_bytes
 from mbma_tables.common.progress import echo
 from mbma_tables.common.toml_files import read_toml, with_settings
-from mbma_tables.export.targets import targets
+from mbma_tables.export.targets import Options
 from mbma_tables.export.text import written_by
 from mbma_tables.surfaces.surface import assumptions
 
@@ -154,16 +154,8 @@ def _export_joint(
     if file is not None:
         digest = hashlib.sha256(read_file(file, MAX_BYTES)).hexdigest()
         made_by.insert(0, f"input {file}: sha256 {digest}")
-    options["made_by"] = tuple(made_by)
-    joint = _joint(file, settings)
-    if str(out) == "-":
-        first = joint.export(target, **options)
-        assert isinstance(first, str | bytes)
-        content = first.encode() if isinstance(first, str) else first
-        write_first(targets()[target], content)
-        return
-    for path in joint.export(target, **options, path=out):
-        echo(path)
+    request = Options(**options, made_by=tuple(made_by))
+    write_export(_joint(file, settings).subject(), target, request, out)
 
 
 _joint_options = option_group(
@@ -174,13 +166,6 @@ _joint_options = option_group(
         "target",
         metavar="TARGET",
         help="Write for another program: a target of `mbma export`.",
-    ),
-    click.option(
-        "--without-heat",
-        "heat",
-        flag_value=False,
-        default=None,
-        help="Leave conductance out.",
     ),
     click.option("--length-unit", metavar="UNIT", help="Of the file; mm by default."),
     click.option("--stress-unit", metavar="UNIT", help="Of the file; MPa by default."),

@@ -37,9 +37,7 @@ from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.common.plots import draw_panels
 from mbma_tables.common.toml_files import read_toml
 from mbma_tables.common.units import (
-    HEAT_CONDUCTANCE,
     Units,
-    factor,
     force_over_area,
     stated_unit,
 )
@@ -82,7 +80,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from mbma_tables.export.of_joint import ExportedJoint
+    from mbma_tables.export.request import Subject
 
 Part = AnySurface | Mapping[str, Any]
 FACES = ("part_a", "part_b")
@@ -706,6 +704,7 @@ class Joint(JointQuantities, Displayed):
         length_unit: str | None = None,
         stress_unit: str | None = None,
         leakage: bool = False,
+        direction: str | float | None = None,
         peklenik: float | None = None,
         binaries: str | None = None,
         made_by: tuple[str, ...] = (),
@@ -749,6 +748,8 @@ class Joint(JointQuantities, Displayed):
             program prescribes.
         leakage : bool
             Functions have the flow coefficient of the gaps, too; rows have it alone.
+        direction : str or float, optional
+            Of leakage of a map, as for `describe_law`.
         peklenik : float, optional
             Of a film, as for `flow_factors`.
         binaries : {"here", "all", "none"}, optional
@@ -781,17 +782,10 @@ class Joint(JointQuantities, Displayed):
         >>> [line for line in card.splitlines() if line.startswith("*") and line[1] != "*"][:2]
         ['*SURFACE INTERACTION, NAME=JOINT', '*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL']
         """
-        from mbma_tables.export.of_joint import joint_files
-        from mbma_tables.export.targets import write_files
+        from mbma_tables.export.request import exported
+        from mbma_tables.export.targets import Options
 
-        try:
-            out = None if path is None else pathlib.Path(path)
-        except TypeError:
-            raise InputError(f"path must be that of a file, got {path!r}") from None
-        files = joint_files(
-            self._exported(),
-            target,
-            out=out,
+        options = Options(
             pressures=pressures,
             name=name,
             heat=heat,
@@ -803,43 +797,30 @@ class Joint(JointQuantities, Displayed):
             rows=rows,
             rtol=rtol,
             leakage=leakage,
+            direction=direction,
             peklenik=peklenik,
             binaries=binaries,
         )
-        if out is not None:
-            return write_files(out, files)
-        try:
-            return files[""].decode()
-        except UnicodeDecodeError:
-            return files[""]
+        return exported(self.subject(), target, options, path)
 
-    def _exported(self) -> ExportedJoint:
+    def subject(self) -> Subject:
         """What an export needs of the joint."""
-        from mbma_tables.export.of_joint import ExportedJoint
+        from mbma_tables.export.request import Subject, heat_of
 
         self.require_one("an export")
-        in_units = self._in_units
-        gas = self.interface.gas
-        assert gas is not None
-        conductivity = None
-        if in_units.conductivity_is_given:
-            per_length, unit = in_units.conductivity
-            if unit == HEAT_CONDUCTANCE.unit(in_units.units):
-                # k_s over the surface's unit of length, to W/(m K)
-                conductivity = float(per_length) / factor("m", str(self.surface.unit))
-        isotropic = self.direction is None
-        return ExportedJoint(
+        return Subject(
             surface=self.surface,
             E_star=self.bodies.E_star,
             theory=self.theory,
             hardness=np.inf if self.bodies.hardness is None else self.bodies.hardness,
-            conductivity=conductivity,
+            heat=heat_of(self._in_units, self.surface),
             kappa=self._kappa,
-            kappa_varies=not isotropic,
+            kappa_varies=self.direction is not None,
             friction=self.friction,
-            gas=gas,
+            gas=self.interface.gas,
             bodies=self.bodies,
             interface=self.interface,
+            is_joint=True,
         )
 
     def _kappa(self, area: Any) -> Any:

@@ -55,6 +55,32 @@ AGAINST = {
 }
 
 
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Options:
+    """Options of a file, as `Joint.export` describes them; None where one is not given."""
+
+    pressures: Any = None
+    name: str | None = None
+    heat: bool | None = None
+    friction_pressure: float | str | None = None
+    quantity: str | Sequence[str] | None = None
+    rows: int | None = None
+    rtol: float | None = None
+    length_unit: str | None = None
+    stress_unit: str | None = None
+    leakage: bool | None = None
+    direction: str | float | None = None
+    peklenik: float | None = None
+    binaries: str | None = None
+    made_by: Sequence[str] = ()
+
+    def of_some_targets(self) -> dict[str, Any]:
+        """Those given that some targets take and others refuse, by name."""
+        names = ("rows", "rtol", "leakage", "direction", "peklenik", "binaries")
+        given = {name: getattr(self, name) for name in names}
+        return {name: value for name, value in given.items() if value is not None}
+
+
 @dataclasses.dataclass(frozen=True)
 class Target:
     """Declaration of the output for one program, or in one format."""

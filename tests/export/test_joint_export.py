@@ -513,14 +513,17 @@ def test_the_command_writes_a_joint(tmp_path):
             ("--export", "abaqus", "--pressures", "1MPa", "--out", "-"),
             "--pressures must be like 0.1:100 or 1MPa:50MPa",
         ),
-        (("--export", "abacus", "--out", "-"), "no target of laws is called 'abacus'"),
+        (
+            ("--export", "abacus", "--out", "-"),
+            "no target is named 'abacus'; did you mean 'abaqus'",
+        ),
         (
             ("--export", "c-law", "--pressures", "1MPa:2MPa", "--out", "-"),
             "without effect on c-law",
         ),
         (
             ("--export", "c-law", "--rows", "20", "--out", "-"),
-            "without effect on c-law: leave rows out",
+            "without effect on c-law: leave --rows out",
         ),
         (
             ("--export", "mbdyn", "--length-unit", "mm", "--out", "-"),
@@ -545,7 +548,7 @@ def test_export_of_a_joints_file_names_the_command_that_writes_it():
         main, ["export", "calculix", "--file", str(EXAMPLE), "--out", "-"]
     )
     assert done.exit_code != 0
-    assert f"mbma joint {EXAMPLE} --export TARGET" in str(done.exception) + done.output
+    assert f"mbma export TARGET --joint {EXAMPLE}" in str(done.exception) + done.output
 
 
 @pytest.mark.parametrize(

@@ -222,7 +222,10 @@ test_refused = refusals(
     ({"quantity": "separation"}, "separation has no rows: it is negative"),
     ({"quantity": "solid_conductance"}, "conductance needs conductivity"),
     ({"quantity": "conductance"}, "did you mean '[a-z]+_conductance'"),
-    ({"quantity": "total_conductance"}, "needs the gas .* or `mbma joint FILE"),
+    (
+        {"quantity": "total_conductance"},
+        "needs the gas .* or `mbma export TARGET --joint",
+    ),
     ({"surface": Surface([0.5, 0.8], 1.0, 100.0, 1.0, 3.0)}, "not of a batch"),
     (
         {

@@ -176,7 +176,7 @@ def refuse_joint(path: pathlib.Path, entries: Mapping[str, Any]) -> None:
     if "bodies" in entries or "part_a" in entries:
         raise InputError(
             f"{path} describes a joint, not one surface: `mbma joint {path} --pressure 1MPa` has its results, and "
-            f"`mbma joint {path} --export TARGET --pressures 1MPa:50MPa --out FILE` writes it for other programs"
+            f"`mbma export TARGET --joint {path} --pressures 1MPa:50MPa --out FILE` writes it for other programs"
         )
 
 

@@ -3,22 +3,27 @@
 import csv
 import io
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from mbma_tables.common.arguments import FloatArray, needed
+from mbma_tables.common.arguments import FloatArray, finite_array, needed
+from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import written_bytes
-from mbma_tables.export.law_table import Curve, LawTable
+from mbma_tables.export.law_table import MIN_ROWS, Curve, LawTable
 from mbma_tables.export.reserved_words import matlab_words
 from mbma_tables.export.targets import AGAINST, Target
 from mbma_tables.export.text import checked_name, comment, csv_cell, number
 
 MAX_MATLAB_NAME = 63
-READER = """function y = {name}(x)
+# what a function takes, and where the rows are in the file
+OF_ONE = {"arguments": "x", "place": ""}
+OF_SEVERAL = {"arguments": "x, quantity", "place": ".(quantity)"}
+READER = """function y = {name}({arguments})
 {title}% Linear interpolation in {name}.mat; x and y in its units. Beyond the range: an error.
   rows = load('{name}.mat');
+  rows = rows{place};
   row_x = rows.x(:); row_y = rows.y(:);
   if any(x(:) < row_x(1)) || any(x(:) > row_x(end))
     error('{name}: x must be in [%g, %g]', row_x(1), row_x(end));
@@ -61,33 +66,101 @@ def to_csv(law: LawTable) -> bytes:
     return stream.getvalue().encode()
 
 
-def to_json(law: LawTable) -> bytes:
-    """One object: the header, and the columns by name; of a conductance those of its pressure as "behaviour"."""
+def to_json(law: LawTable | Sequence[LawTable]) -> bytes:
+    """One object: the header, and the columns by name; of a conductance those of its pressure as "behaviour".
 
-    def content(table: LawTable) -> dict[str, Any]:
-        return _header(table) | {
-            "columns": {
-                name: values.tolist() for name, (values, _) in table.columns.items()
-            }
-        }
-
-    whole = content(law) | (
-        {} if law.behaviour is None else {"behaviour": content(law.behaviour)}
+    Of several laws a list of such objects, as "laws".
+    """
+    whole = (
+        _content(law)
+        if isinstance(law, LawTable)
+        else {"laws": [_content(one) for one in law]}
     )
     return (json.dumps(whole, indent=1) + "\n").encode()
 
 
-def to_matlab(law: LawTable) -> bytes:
-    """A MATLAB file of version 5: x, y, and the header as text."""
+def _content(law: LawTable) -> dict[str, Any]:
+    """Header and columns of a law, and of the one beside it."""
+    columns = {name: values.tolist() for name, (values, _) in law.columns.items()}
+    content = _header(law) | {"columns": columns}
+    if law.behaviour is not None:
+        content["behaviour"] = _content(law.behaviour)
+    return content
+
+
+def from_json(content: bytes) -> list[LawTable]:
+    """The laws of a file that `to_json` wrote.
+
+    Raises
+    ------
+    InputError
+        Where it is no such file.
+    """
+    try:
+        whole = json.loads(content)
+        return [_law_of(one) for one in whole.get("laws", [whole])]
+    except (ValueError, KeyError, TypeError, AttributeError) as fault:
+        raise InputError(
+            f"this is no file of rows that `mbma export json` writes: {fault!r}"
+        ) from None
+
+
+def _law_of(content: Mapping[str, Any]) -> LawTable:
+    """The law of an object, whose numbers are checked."""
+    columns = {
+        name: finite_array(name, values) for name, values in content["columns"].items()
+    }
+    x = columns.pop(content["x"])
+    y = columns.pop(content["y"])
+    for name, values in (("y", y), *columns.items()):
+        if values.shape != x.shape or x.ndim != 1 or x.size < MIN_ROWS:
+            raise InputError(f"{name} has shape {values.shape}, and x {x.shape}")
+    if (np.diff(x) <= 0).any():
+        raise InputError(f"{content['x']} must rise from row to row")
+    more = {name: (values, content["units"][name]) for name, values in columns.items()}
+    behaviour = content.get("behaviour")
+    facts = {}
+    for name, (value, unit) in content["facts"].items():
+        facts[name] = (float(value), str(unit))
+    return LawTable(
+        x,
+        y,
+        x_name=str(content["x"]),
+        y_name=str(content["y"]),
+        x_unit=str(content["x_unit"]),
+        y_unit=str(content["y_unit"]),
+        largest_error=float(content["largest_error"]),
+        comments=tuple(map(str, content["comments"])),
+        theory=str(content["theory"]),
+        floor=float(content["floor"]),
+        behaviour=None if behaviour is None else _law_of(behaviour),
+        more=more,
+        facts=facts,
+    )
+
+
+def to_matlab(law: LawTable | Sequence[LawTable]) -> bytes:
+    """A MATLAB file of version 5: x, y, and the header as text; of several laws a structure for each quantity."""
     from scipy.io import savemat
 
     stream = io.BytesIO()
+    content = (
+        _matlab_content(law)
+        if isinstance(law, LawTable)
+        else {one.quantity: _matlab_content(one) for one in law}
+    )
+    savemat(stream, content, format="5", oned_as="column")
+    # the first 116 bytes are free text, where scipy writes the time: replaced, for identical bytes
+    return b"MATLAB 5.0 MAT-file, mbma_tables".ljust(116) + stream.getvalue()[116:]
+
+
+def _matlab_content(law: LawTable) -> dict[str, Any]:
+    """Variables of a law."""
     text = {
         name: value
         for name, value in _header(law).items()
         if name not in ("x", "y", "comments", "facts")
     }
-    comments = np.array(law.comments, dtype=object)
     named = {
         "x": law.x[:, None],
         "y": law.y[:, None],
@@ -95,19 +168,33 @@ def to_matlab(law: LawTable) -> bytes:
         "y_name": law.y_name,
     }
     named |= {name: values[:, None] for name, (values, _) in law.more.items()}
-    savemat(stream, named | text | {"comments": comments}, format="5", oned_as="column")
-    # the first 116 bytes are free text, where scipy writes the time: replaced, for identical bytes
-    return b"MATLAB 5.0 MAT-file, mbma_tables".ljust(116) + stream.getvalue()[116:]
+    return named | text | {"comments": np.array(law.comments, dtype=object)}
 
 
-def matlab_reader(law: LawTable, name: str) -> bytes:
-    """The function NAME.m that looks up the MATLAB file NAME.mat."""
+def matlab_reader(law: LawTable | Sequence[LawTable], name: str) -> bytes:
+    """The function NAME.m that looks up the MATLAB file NAME.mat; of several laws by the quantity as well."""
     checked_name(name, MAX_MATLAB_NAME, matlab_words(READER), "matlab")
-    return READER.format(name=name, title=comment(law.comments[1:2], "%")).encode()
+    if isinstance(law, LawTable):
+        titles = law.comments[1:2]
+        return READER.format(name=name, title=comment(titles, "%"), **OF_ONE).encode()
+    titles = tuple(one.title for one in law)
+    return READER.format(name=name, title=comment(titles, "%"), **OF_SEVERAL).encode()
 
 
-def to_netcdf(law: LawTable) -> bytes:
-    """A netCDF-4 file with CF attributes, which is an HDF5 file, too."""
+def to_netcdf(law: LawTable | Sequence[LawTable]) -> bytes:
+    """A netCDF-4 file with CF attributes, which is an HDF5 file, too; of several laws a group for each quantity."""
+    if isinstance(law, LawTable):
+        return written_bytes("law.nc", lambda path: _write_group(path, law, None, "w"))
+
+    def write(path: str) -> None:
+        for place, one in enumerate(law):
+            _write_group(path, one, one.quantity, "a" if place else "w")
+
+    return written_bytes("law.nc", write)
+
+
+def _write_group(path: Any, law: LawTable, group: str | None, mode: Any) -> None:
+    """Write a law into a group of a file, or into the file itself."""
     dataset = law.to_dataset()
     dataset.attrs = {
         "Conventions": "CF-1.11",
@@ -125,9 +212,7 @@ def to_netcdf(law: LawTable) -> bytes:
         dataset = dataset.rename_dims(pressure="row").drop_indexes("pressure")
     # CF 2.5.1: a coordinate has no missing values, nor has anything here
     whole = {name: {"_FillValue": None} for name in law.columns}
-    return written_bytes(
-        "law.nc", lambda path: dataset.to_netcdf(path, engine="netcdf4", encoding=whole)
-    )
+    dataset.to_netcdf(path, engine="netcdf4", encoding=whole, group=group, mode=mode)
 
 
 to_hdf5 = to_netcdf
@@ -145,7 +230,7 @@ def to_parquet(law: LawTable) -> bytes:
     return stream.getvalue()
 
 
-def _matlab_files(law: LawTable, name: str) -> dict[str, bytes]:
+def _matlab_files(law: LawTable | Sequence[LawTable], name: str) -> dict[str, bytes]:
     return {"": to_matlab(law), ".m": matlab_reader(law, name)}
 
 
@@ -166,8 +251,12 @@ def read_csv(content: bytes) -> list[Curve]:
 
 
 def read_json(content: bytes) -> list[Curve]:
-    """Columns of the object."""
-    return _curves(json.loads(content)["columns"])
+    """Columns of the object, or of several."""
+    whole = json.loads(content)
+    curves = []
+    for one in whole.get("laws", [whole]):
+        curves += _curves(one["columns"])
+    return curves
 
 
 def read_matlab(content: bytes) -> list[Curve]:
@@ -175,6 +264,18 @@ def read_matlab(content: bytes) -> list[Curve]:
     from scipy.io import loadmat
 
     held = loadmat(io.BytesIO(content))
+    if "x" in held:
+        return _matlab_curves(held)
+    curves = []
+    for name, values in held.items():
+        if not name.startswith("__"):
+            record = values[0, 0]
+            curves += _matlab_curves({key: record[key] for key in record.dtype.names})
+    return curves
+
+
+def _matlab_curves(held: dict[str, Any]) -> list[Curve]:
+    """The vectors of a structure."""
     rows = held["x"].size
     columns = {}
     for name in ("x", "y"):
@@ -186,12 +287,16 @@ def read_matlab(content: bytes) -> list[Curve]:
 
 
 def read_netcdf(content: bytes) -> list[Curve]:
-    """Variables of the file."""
+    """Variables of the file, or of its groups."""
     import netCDF4
 
+    curves = []
     with netCDF4.Dataset("law.nc", memory=content) as held:
-        columns = {name: np.array(values[:]) for name, values in held.variables.items()}
-    return _curves(columns)
+        for group in (held, *held.groups.values()):
+            if group.variables:
+                found = group.variables.items()
+                curves += _curves({name: np.array(values[:]) for name, values in found})
+    return curves
 
 
 def read_parquet(content: bytes) -> list[Curve]:
@@ -222,10 +327,15 @@ def _target(
 
 TARGETS = (
     _target("csv", to_csv, read_csv, "R 4.2"),
-    _target("json", to_json, read_json, "Python's `json`"),
-    _target("netcdf", to_netcdf, read_netcdf, "R 4.2, netCDF4 of Python"),
+    _target("json", to_json, read_json, "Python's `json`", several=True),
+    _target("netcdf", to_netcdf, read_netcdf, "R 4.2, netCDF4 of Python", several=True),
     _target(
-        "hdf5", to_netcdf, read_netcdf, "h5py", "the netCDF file, which is one of HDF5"
+        "hdf5",
+        to_netcdf,
+        read_netcdf,
+        "h5py",
+        "the netCDF file, which is one of HDF5",
+        several=True,
     ),
     _target("parquet", to_parquet, read_parquet, "pyarrow"),
     _target(
@@ -236,6 +346,7 @@ TARGETS = (
         "a `.mat` file of version 5 and a function that interpolates in it",
         end=".mat",
         longest_name=MAX_MATLAB_NAME,
+        several=True,
         beside=(".m",),
     ),
 )

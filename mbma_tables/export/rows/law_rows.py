@@ -178,7 +178,7 @@ def describe_law(
     if quantity == "total_conductance" and gas is None:
         raise InputError(
             "total_conductance needs the gas in the gaps, which is missing: Joint(..., gas='air').export(...), "
-            "or `mbma joint FILE --export TARGET`; without gas it is quantity='solid_conductance'"
+            "or `mbma export TARGET --joint FILE`; without gas it is quantity='solid_conductance'"
         )
     theory = "calibrated" if film and theory is None else theory
     bodies = E_star
