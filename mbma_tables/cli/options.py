@@ -29,7 +29,7 @@ LOADS = ("separation", "mean_separation", "pressure", "area")
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 DEFAULT_RTOL = 1e-8
-MANY = 20  # options of a command whose help has sections
+MANY = 24  # options of a command whose help has sections
 PICTURES = tuple(f".{kind}" for kind in KINDS)
 
 
