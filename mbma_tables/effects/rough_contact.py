@@ -25,6 +25,7 @@ from mbma_tables.common.plots import new_figure
 from mbma_tables.contacts.contact import contact
 from mbma_tables.contacts.law.law import ContactLaw
 from mbma_tables.contacts.law.make import contact_law
+from mbma_tables.contacts.question import name_of_the_given
 from mbma_tables.effects.force_law import (
     RTOL,
     Body,
@@ -244,9 +245,7 @@ def rough_contact(
     layer_theory = resolve(theory, surface)
     fixed = number_in("reference", fixed, 1e-30 * R, largest)
     body = Body(law, R, plane, fixed, surface, layer_theory, *units_of(units, plane))
-    if (approach is None) == (force is None):
-        raise InputError("give approach or force, one of them")
-    if force is None:
+    if name_of_the_given({"approach": approach, "force": force}) == "approach":
         wanted = finite_array("approach", units.number("approach", approach))
         apart = -body.ends[1]
         require(

@@ -59,7 +59,7 @@ MISTAKES = [
     (scene(effects="on = []"), "effects.on: .* should be non-empty"),
     (scene(effects='on = ["pressure"]\noff = ["area"]'), "'area' is not one of"),
     (scene(effects='on = ["energy"]\noff = ["finite_height"]'), "leave finite_height on"),
-    (scene(at=None), "give one of separations"),
+    (scene(at=None), "give exactly one of separations"),
     (scene('theory = "persons"'), "did you mean 'persson'"),
     (scene(at="separations = [-2.0]"), "at least -h_max"),
     (

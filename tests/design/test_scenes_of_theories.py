@@ -121,7 +121,7 @@ test_what_is_refused = refusals(
     ),
     (
         {"areas": [0.1]},
-        "prescribe one of separations, mean_separations, pressures, areas",
+        "give exactly one of separations, mean_separations, pressures, areas; got ",
     ),
     ({"separations": None, "areas": [-0.1]}, "areas must be at least 0"),
     ({"theory": 3}, "theory must be one of"),

@@ -223,7 +223,7 @@ def test_units_validity_and_what_is_refused(tmp_path):
     asked = {"bodies": "110 GPa", "theory": "mbma"}
     for wrong, match in (
         ({"approach": -1.75}, "apart"),
-        ({"approach": 1.0, "force": 1.0}, "one of them"),
+        ({"approach": 1.0, "force": 1.0}, "exactly one of approach, force; got approach"),
         ({"force": "3 N/mm"}, "like '10 N'"),
         ({"force": -1.0}, "positive"),
         ({"force": [[1.0]]}, "number or a list"),

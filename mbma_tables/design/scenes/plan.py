@@ -22,7 +22,6 @@ import numpy as np
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.design.scenes.problem import (
-    INVERTED,
     OUTPUTS,
     REFINEMENTS,
     Problem,
@@ -313,7 +312,8 @@ class _Planner:
 
     @property
     def count(self) -> int:
-        return 0 if self.problem.gaps is None else int(self.problem.gaps.size)
+        question = self.problem.question
+        return 0 if question is None else int(question.value.size)
 
     def plan(self) -> Plan:
         problem = self.problem
@@ -340,8 +340,8 @@ class _Planner:
         why = of_contact(outputs)
         if hertz:
             why.remove("area")
-        if problem.prescribed in INVERTED:
-            why.append(f"{problem.prescribed} prescribed")
+        if problem.question is not None and problem.is_inverted:
+            why.append(f"{problem.question.name}s prescribed")
         steps = []
         if why:
             steps.append(self.contact(why))
@@ -405,7 +405,7 @@ class _Planner:
         """One contact at all gaps, by the scene's theory."""
         outputs = self.problem.outputs
         requirements = {
-            "inverse": self.problem.prescribed in INVERTED,
+            "inverse": self.problem.is_inverted,
             "slopes": self.problem.needs_slopes,
             "energy": self.problem.computes("energy"),
             "yield": "yield" in outputs,
@@ -518,14 +518,14 @@ class _Planner:
         from mbma_tables.theories import resolve
 
         surface = self.problem.surface
-        gaps = self.problem.gaps
+        question = self.problem.question
         h_max = float(surface.h_max)
         farthest = 0.0
         # the farther from the mid-plane, the larger
-        if self.problem.prescribed == "mean_separations":
-            farthest = np.max(gaps)
-        elif self.problem.prescribed not in INVERTED:
-            farthest = np.max((h_max + gaps) / 2)
+        if question is not None and question.name == "mean_separation":
+            farthest = np.max(question.value)
+        elif question is not None and question.is_gap:
+            farthest = np.max((h_max + question.value) / 2)
         u = min(max(farthest, 0.5 * h_max), LAST * h_max)
         theory = resolve(self.problem.theory, surface)
         return float(theory.answer(surface, np.asarray(u)).error)

@@ -20,6 +20,7 @@ from mbma_tables.common.arguments import (
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, modulus_and_units, require_surface
 from mbma_tables.contacts.quantities.registry import registry
+from mbma_tables.contacts.question import Question, name_of_the_given
 from mbma_tables.islands.island_models import ISLAND_MODELS, AnyModel
 from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -47,8 +48,13 @@ OUTPUTS = (*OF_CONTACT[:6], *OF_ISLANDS, "comparison", *OF_CONTACT[6:])
 # part of the model, and on unless switched off
 REFINEMENTS = ("subscale_area", "sphere_deformation", "finite_height")
 ELASTIC = ("energy", *OF_ISLANDS)  # for contacts without yielding
-PRESCRIBED = ("separations", "mean_separations", "pressures", "areas")
-INVERTED = ("pressures", "areas")  # gaps follow from them
+# parameters of which one is prescribed, and the quantity that it has numbers of
+PRESCRIBED = {
+    "separations": "separation",
+    "mean_separations": "mean_separation",
+    "pressures": "pressure",
+    "areas": "area",
+}
 MIN_RTOL = 1e-10
 MAX_RTOL = 0.1
 MAX_SECONDS = 1e6
@@ -81,7 +87,7 @@ def is_made_of(name: str, effect: str) -> bool:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Problem:
-    """The parameters of `Scene`, with derived fields such as `outputs`, `gaps` and `units`."""
+    """The parameters of `Scene`, with derived fields such as `outputs`, `question` and `units`."""
 
     surface: AnySurface
     effects: Sequence[str] = ("pressure", "area")
@@ -105,7 +111,8 @@ class Problem:
     title: str = "scene"
     outputs: frozenset[str] = dataclasses.field(init=False)
     dropped: frozenset[str] = dataclasses.field(init=False)
-    gaps: Any = dataclasses.field(init=False)
+    #: the prescribed quantity; None if no effect needs one
+    question: Question | None = dataclasses.field(init=False)
     units: Units = dataclasses.field(init=False)
     conductance_unit: str = dataclasses.field(init=False, default="")
 
@@ -132,7 +139,7 @@ class Problem:
             variant=get_variant(self.variant),
             theories=tuple(self.theories),
         )
-        vars(self).update(gaps=self._checked_gaps())
+        vars(self).update(question=self._checked_question())
         self._check_parameters_of_effects()
         self._check_theories()
 
@@ -219,24 +226,18 @@ class Problem:
             raise InputError(f"pressure_profile is that of the deformed sphere: {remedy}")
         vars(self).update(outputs=outputs, dropped=dropped)
 
-    def _checked_gaps(self) -> Any:
-        """The prescribed numbers; None if no effect needs gaps."""
-        prescribed = [name for name in PRESCRIBED if getattr(self, name) is not None]
-        choice = ", ".join(PRESCRIBED)
-        if len(prescribed) > 1:
-            raise InputError(
-                f"{' and '.join(prescribed)} are given: prescribe one of {choice}"
-            )
+    def _checked_question(self) -> Question | None:
+        """The prescribed quantity with its numbers, a row; None if no effect needs it."""
+        candidates = {name: getattr(self, name) for name in PRESCRIBED}
+        # profiles are those of islands at approaches
         if self.outputs == {"pressure_profile"}:
-            # profiles are those of islands at approaches
-            if prescribed:
-                unused = f"{prescribed[0]} are not needed by any effect"
-                raise InputError(f"{unused}: leave them out, or request 'pressure'")
+            for name, value in candidates.items():
+                if value is not None:
+                    unused = f"{name} are not needed by any effect"
+                    raise InputError(f"{unused}: leave them out, or request 'pressure'")
             return None
-        if not prescribed:
-            raise InputError(f"nothing is prescribed: give one of {choice}")
-        (name,) = prescribed
-        numbers = finite_array(name, getattr(self, name))
+        name = name_of_the_given(candidates)
+        numbers = finite_array(name, candidates[name])
         if numbers.ndim > 1:
             raise InputError(
                 f"{name} must be one number or a list, got shape {numbers.shape}"
@@ -250,10 +251,11 @@ class Problem:
         if name == "mean_separations":
             allowed = "at least 0, where the model ends (d = -h_max)"
         require(name, numbers, numbers >= least, allowed)
-        if name in INVERTED and "finite_height" in self.dropped:
+        question = Question(PRESCRIBED[name], np.atleast_1d(numbers).astype(float))
+        if not question.is_gap and "finite_height" in self.dropped:
             remedy = "leave finite_height on, or give separations"
             raise InputError(f"{name} need a surface that ends at h_max: {remedy}")
-        return np.atleast_1d(numbers).astype(float)
+        return question
 
     def _check_parameters_of_effects(self) -> None:
         """Parameters that one effect needs and no other uses."""
@@ -271,9 +273,10 @@ class Problem:
                 raise InputError(f"{name} given and effect {effect!r} is off: {remedy}")
         if self.hardness is not None:
             cap = number_in("hardness", self.hardness, 1e-300, 1e300)
-            if self.prescribed == "pressures":
+            if self.pressures is not None:
                 allowed = f"at most the hardness, {cap:.6g}"
-                require("pressures", self.gaps, self.gaps <= cap, allowed)
+                pressures = np.asarray(self.pressures)
+                require("pressures", pressures, pressures <= cap, allowed)
         for name in ("conductivities", "deltas"):
             if getattr(self, name) is not None:
                 numbers = finite_array(name, getattr(self, name))
@@ -339,8 +342,6 @@ class Problem:
         return self.theory if isinstance(self.theory, str) else self.theory.name
 
     @property
-    def prescribed(self) -> str | None:
-        """Name of the given quantity of `PRESCRIBED`."""
-        return next(
-            (name for name in PRESCRIBED if getattr(self, name) is not None), None
-        )
+    def is_inverted(self) -> bool:
+        """Whether gaps follow from prescribed pressures or areas."""
+        return self.question is not None and not self.question.is_gap

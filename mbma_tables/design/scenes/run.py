@@ -22,7 +22,7 @@ from mbma_tables.common.plots import Curve, theory_label
 from mbma_tables.common.progress import doing
 from mbma_tables.contacts.quantities.registry import registry, unit_of
 from mbma_tables.design.scenes.plan import AMPLIFICATION, TABLES, Plan, Step
-from mbma_tables.design.scenes.problem import INVERTED, Problem
+from mbma_tables.design.scenes.problem import Problem
 from mbma_tables.islands.island_models import RigidModel, answer_islands
 from mbma_tables.islands.variants import get_variant
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -72,6 +72,10 @@ class Run:
             self.quantities[name] = (dimensions, array)
 
 
+# names of prescribed quantities in results, beside what is computed
+GIVEN = {"pressure": "nominal_pressure", "area": "prescribed_area"}
+
+
 def _contact(run: Run, step: Step) -> None:
     """One contact at all gaps, and of it the requested quantities."""
     from mbma_tables.contacts.contact import contact
@@ -86,12 +90,12 @@ def _contact(run: Run, step: Step) -> None:
             "outside": _outside(step),
         }
         theory = resolve(theory, options=options)
-    assert problem.prescribed is not None
+    assert problem.question is not None
     # without its end the surface is a higher one, whose mean gaps are others than the scene's
     if "finite_height" in problem.dropped:
         arguments = {"separation": run.gap}
     else:
-        arguments = {problem.prescribed[:-1]: problem.gaps}
+        arguments = {problem.question.name: problem.question.value}
     bodies = Bodies(
         problem.E_star, hardness=problem.hardness, conductivity=problem.conductivities
     )
@@ -147,7 +151,7 @@ def _amplification(run: Run, theory: Any) -> float:
     problem = run.problem
     h_max = float(run.surface.h_max)
     gap = run.gap[run.gap < h_max]
-    is_inverted = problem.prescribed in INVERTED
+    is_inverted = problem.is_inverted
     needs_slopes = problem.needs_slopes
     if not gap.size or not (needs_slopes or is_inverted):
         return 1.0
@@ -158,7 +162,8 @@ def _amplification(run: Run, theory: Any) -> float:
     if is_inverted:
         # pressures at prescribed areas: less accurate where the area hardly rises
         by_area = log_slope * totals.area / np.abs(totals.area_slope)
-        factor += max(1.0, float(by_area.max())) if problem.prescribed == "areas" else 1.0
+        at_areas = problem.areas is not None
+        factor += max(1.0, float(by_area.max())) if at_areas else 1.0
     if not needs_slopes:
         return factor
     # the stiffness is small only next to a turning point
@@ -172,11 +177,11 @@ def _law(run: Run, step: Step) -> None:
 
     problem = run.problem
     assert step.rtol is not None
-    assert problem.prescribed is not None
+    assert problem.question is not None
     law = contact_law(run.surface, problem.E_star, theory=problem.theory, rtol=step.rtol)
     amplification = 1.0
-    if problem.prescribed in INVERTED:
-        run.gap = law.separation(**{problem.prescribed[:-1]: problem.gaps})
+    if problem.is_inverted:
+        run.gap = law.separations_of(problem.question)
         amplification = AMPLIFICATION["inverse"]
     for name in problem.outputs & {"pressure", "area"}:
         at_gap = getattr(law, name)
@@ -341,15 +346,14 @@ def run_plan(problem: Problem, plan: Plan) -> xr.Dataset:
     """
     run = Run(problem, problem.surface)
     h_max = float(problem.surface.h_max)
-    if problem.prescribed == "pressures":
-        run.keep({"nominal_pressure": problem.gaps})
-    elif problem.prescribed == "areas":
-        run.keep({"prescribed_area": problem.gaps})
-    elif problem.gaps is not None:
-        is_separation = problem.prescribed == "separations"
-        run.gap = problem.gaps if is_separation else 2 * problem.gaps - h_max
+    question = problem.question
+    if question is not None and question.is_gap:
+        is_separation = question.name == "separation"
+        run.gap = question.value if is_separation else 2 * question.value - h_max
         if "finite_height" in problem.dropped:
             run.surface = _without_end(problem.surface, run.gap, plan.rtol)
+    elif question is not None:
+        run.keep({GIVEN[question.name]: question.value})
     # steps of a plan by name; any other name is that of a theory to compare with
     evaluated_by: dict[str, Callable[[Run, Step], None]] = {
         "contact": _contact,
