@@ -29,6 +29,7 @@ from scipy.interpolate import NdBSpline, RegularGridInterpolator, make_interp_sp
 
 from benchmarks.display import display, display_command
 from benchmarks.exports import exported
+from benchmarks.functions import functions
 from benchmarks.kernels import BEFORE, held_out, measured
 from benchmarks.maps import maps
 from benchmarks.rows import LINES, microseconds, report, rounds, times_faster
@@ -478,6 +479,7 @@ def main(context: click.Context, write: bool) -> None:
         page.write("lookup", {"times": f"{machine}\n\n{measured}"}, {}, ROOT)
 
 
+main.add_command(functions)
 main.add_command(surrogates)
 main.add_command(display_command)
 

@@ -206,7 +206,7 @@ def _make_of_function(
     if table is None:
         echo(f"part {part}: its pieces are in {make_function.folder_of(out)}")
         return
-    echo(f"{out}: {table!r}; {out.stat().st_size} bytes")
+    echo(f"{out}: {table!r}")
 
 
 @tables_group.command("export")
@@ -255,7 +255,7 @@ def merge_command(out: Path, folders: tuple[Path, ...]) -> None:
 
     check_place(out)
     table = make_function.merge(out, list(folders) or [make_function.folder_of(out)])
-    echo(f"{out}: {table!r}; {out.stat().st_size} bytes")
+    echo(f"{out}: {table!r}")
 
 
 @tables_group.command("info")

@@ -9,8 +9,8 @@
 
 /* Chebyshev polynomials of one axis at a place in its box, and their slopes by the axis. */
 typedef struct {
-    size_t terms;
-    size_t stride; /* coefficients from one term to the next */
+    size_t terms;   /* of the last axis with the zeros behind them */
+    size_t stride;  /* coefficients from one term to the next */
     double value[MBMA_MAX_TERMS], slope[MBMA_MAX_TERMS];
 } basis;
 
@@ -24,22 +24,34 @@ static void fill_basis(basis *b, double x, double rate, bool slopes) {
         b->slope[k] = 2.0 * rate * b->value[k - 1] + mbma_fma(2.0 * x, b->slope[k - 1], -b->slope[k - 2]);
 }
 
-/* The sum over the last two axes, row by row. */
-static double sum_of_plane(const basis *b, const double *c, double *slopes) {
-    const size_t columns = b[1].terms;
+/* The sum over the last two axes, row by row; `columns` is a constant of the caller, so that loops over them vanish. */
+MBMA_INLINE double sum_of_rows(const basis *b, const double *c, double *slopes, const size_t columns) {
     double row[MBMA_MAX_TERMS] = {0.0}, slope_row[MBMA_MAX_TERMS] = {0.0};
-    for (size_t i = 0; i < b[0].terms; i++, c += columns) {
-        const double factor = b[0].value[i], by_axis = b[0].slope[i];
+    for (size_t i = 0; i < b[0].terms; i++, c += columns)
         for (size_t j = 0; j < columns; j++)
-            row[j] = mbma_fma(factor, c[j], row[j]);
-        for (size_t j = 0; slopes && j < columns; j++)
-            slope_row[j] = mbma_fma(by_axis, c[j], slope_row[j]);
-    }
+            row[j] = mbma_fma(b[0].value[i], c[j], row[j]);
     if (slopes) {
+        c -= b[0].terms * columns;
+        for (size_t i = 0; i < b[0].terms; i++, c += columns)
+            for (size_t j = 0; j < columns; j++)
+                slope_row[j] = mbma_fma(b[0].slope[i], c[j], slope_row[j]);
         slopes[0] = dot(slope_row, b[1].value, columns);
         slopes[1] = dot(row, b[1].slope, columns);
     }
     return dot(row, b[1].value, columns);
+}
+
+static double sum_of_plane(const basis *b, const double *c, double *slopes) {
+    switch (b[1].terms) {
+    case 4:
+        return sum_of_rows(b, c, slopes, 4);
+    case 12:
+        return sum_of_rows(b, c, slopes, 12);
+    case 8:
+        return sum_of_rows(b, c, slopes, 8);
+    default:
+        return sum_of_rows(b, c, slopes, b[1].terms);
+    }
 }
 
 /* The sum over all axes, and its slopes by each of them unless `slopes` is NULL. */
@@ -126,7 +138,9 @@ static bool answer(const mbma_cell_table *t, const double *x, double *values, do
         const double rate = 2.0 / (high[a] - low[a]);
         b[a].terms = (size_t)terms, b[a].stride = size;
         fill_basis(&b[a], (place[a] - low[a]) * rate - 1.0, rate, slopes != NULL);
-        size *= (size_t)terms;
+        for (; a + 1 == t->axes && b[a].terms % MBMA_LANES; b[a].terms++)
+            b[a].value[b[a].terms] = b[a].slope[b[a].terms] = 0.0;
+        size *= b[a].terms;
     }
     const int64_t start = t->starts[cell];
     if (start < 0 || size > t->coefficient_count || (size_t)start > t->coefficient_count ||

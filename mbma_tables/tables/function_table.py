@@ -40,6 +40,7 @@ OUTSIDE = ("raise", "nan", "nearest", "periodic")  # policies of an axis
 IN_CORE = {"raise": 0, "nan": 0, "nearest": 1, "periodic": 2}  # as in mbma.h
 BLOCK = 1 << 14  # points between two checks for Ctrl-C
 STEPS = 80  # of an inverse
+LANES = 4  # `MBMA_LANES` of mbma.h
 ROUNDING = 4e-15
 
 
@@ -128,20 +129,36 @@ class FunctionTable:
     ) -> None:
         self.axes, self.outputs = axes, outputs
         self.attributes = dict(attributes)
-        self._arrays = {name: np.asarray(array) for name, array in arrays.items()}
+        self.arrays = {name: np.asarray(array) for name, array in arrays.items()}
 
     def __reduce__(self) -> Any:
-        return type(self), (self.axes, self.outputs, self._arrays, self.attributes)
+        return type(self), (self.axes, self.outputs, self.arrays, self.attributes)
 
     def __repr__(self) -> str:
         ranges = ", ".join(f"{a.name} {a.low:g} to {a.high:g}" for a in self.axes)
         largest = json.loads(self.attributes["certificate"])["largest_error"]
         errors = ", ".join(f"{name} {error:.2g}" for name, error in largest.items())
-        cells = self._arrays["starts"].size
+        cells = self.arrays["starts"].size
         return (
             f"FunctionTable({self.attributes['function']}: covers {ranges}, {cells} cells, "
             f"largest held-out error {errors})"
         )
+
+    @functools.cached_property
+    def core_arrays(self) -> dict[str, Any]:
+        """The arrays as the core has them: terms of the last axis followed by zeros to a multiple of LANES."""
+        terms = self.arrays["terms"].astype(int)
+        last = terms[:, -1]
+        padded = -(-last // LANES) * LANES
+        rows = len(self.outputs) * terms[:, :-1].prod(axis=1)
+        starts = np.concatenate([[0], np.cumsum(rows * padded)])
+        widths = np.repeat(padded, rows)
+        used = np.repeat(last, rows)
+        first = np.concatenate([[0], np.cumsum(widths)])[:-1]
+        within = np.arange(used.sum()) - np.repeat(np.cumsum(used) - used, used)
+        coefficients = np.zeros(starts[-1])
+        coefficients[np.repeat(first, used) + within] = self.arrays["coefficients"]
+        return self.arrays | {"starts": starts[:-1], "coefficients": coefficients}
 
     @functools.cached_property
     def _core(self) -> tuple[Any, ...]:
@@ -158,7 +175,7 @@ class FunctionTable:
         whole = {"starts": np.int64, "branches": np.int32, "terms": np.int32}
         arrays = {
             name: np.ascontiguousarray(array, dtype=whole.get(name, np.float64)).ravel()
-            for name, array in self._arrays.items()
+            for name, array in self.core_arrays.items()
         }
         names = ("branches", "middles", "starts", "terms", "coefficients", "errors")
         exponential = np.array(logs, dtype=np.int32)
@@ -173,8 +190,8 @@ class FunctionTable:
     @functools.cached_property
     def _ends(self) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
         """Numbers of the boxes of cells, and their ends in coordinates, shape (cells, axes)."""
-        branches = self._arrays["branches"].astype(int)
-        middles = self._arrays["middles"]
+        branches = self.arrays["branches"].astype(int)
+        middles = self.arrays["middles"]
         low, high = np.empty((2, len(branches), len(self.axes)))
         low[0] = [axis.to_grid(axis.low) for axis in self.axes]
         high[0] = [axis.to_grid(axis.high) for axis in self.axes]
@@ -348,7 +365,7 @@ class FunctionTable:
         terms of the cell: its slope is at most (2 terms)^2 times its largest value over
         half the cell's width.
         """
-        terms = self._arrays["terms"].astype(float)
+        terms = self.arrays["terms"].astype(float)
         factors = (2 * terms) ** 2 * 2 / self._widths
         found = bounds[:, :, None] * factors[cells][:, None, :]
         for a, axis in enumerate(self.axes):
@@ -526,7 +543,7 @@ def read_function_table(path: os.PathLike[str] | str) -> FunctionTable:
 
 def checked(table: FunctionTable) -> FunctionTable:
     """A table whose tree and polynomials fit together, or ValueError."""
-    arrays = table._arrays
+    arrays = table.arrays
     branches, terms = arrays["branches"], arrays["terms"]
     cells, axes, outputs = len(arrays["starts"]), len(table.axes), len(table.outputs)
     if not 1 <= axes <= MOST_AXES or outputs < 1:

@@ -629,7 +629,7 @@ def write(path: pathlib.Path, table: FunctionTable) -> None:
         "errors": (("cell", "output"), "bound on the error in each cell"),
     }
     variables = {
-        name: (dims, table._arrays[name], meaning, "1")
+        name: (dims, table.arrays[name], meaning, "1")
         for name, (dims, meaning) in over.items()
     }
     write_own(path, variables, table.attributes, KIND, FORMAT)

@@ -214,7 +214,7 @@ def test_policies_of_axes(tmp_path):
 
 def bits(path):
     table = open_table(path)
-    return [table._arrays[name].tobytes() for name in sorted(table._arrays)]
+    return [table.arrays[name].tobytes() for name in sorted(table.arrays)]
 
 
 def test_tables_are_the_same_by_one_process_two_or_in_parts(tmp_path):

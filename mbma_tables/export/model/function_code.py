@@ -110,11 +110,13 @@ def _about(table: FunctionTable, command: str) -> list[str]:
     ]
 
 
-def _parts(table: FunctionTable, name: str, mark: str, command: str) -> dict[str, Any]:
+def _parts(
+    table: FunctionTable, name: str, language: str, command: str
+) -> dict[str, Any]:
     """Places of the templates."""
     arrays = {
         key: _texts(array.astype(int) if key in WHOLE else array)
-        for key, array in table._arrays.items()
+        for key, array in (table.core_arrays if language == "c" else table.arrays).items()
     }
     rows = [
         [
@@ -126,10 +128,10 @@ def _parts(table: FunctionTable, name: str, mark: str, command: str) -> dict[str
         for axis in table.axes
     ]
     points, expected = _replayed(table)
-    terms = table._arrays["terms"]
+    terms = table.arrays["terms"]
     return {
         "name": name,
-        "header": opening(_about(table, command), mark),
+        "header": opening(_about(table, command), MARKS[language]),
         "axes": table.axes,
         "outputs": table.outputs,
         "axis_rows": rows,
@@ -214,7 +216,7 @@ def function_code(
     checked_name(name, MAX_NAME, names, language)
     for axis in table.axes:
         checked_name(axis.name, MAX_NAME, (), f"{language} as a name of an axis")
-    parts = _parts(table, name, mark, command)
+    parts = _parts(table, name, language, command)
     if language == "c":
         return _c_files(parts, name)
     end = ENDS[language]
