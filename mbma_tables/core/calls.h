@@ -253,6 +253,20 @@ static bool do_island_answers(const argument *a, long long *answer) {
     return true;
 }
 
+static bool do_island_totals(const argument *a, long long *answer) {
+    enum { HURST, ZETA_1, COMPRESSION, PEAK, RTOL, VARIANT, TABLE_AT };
+    enum { TOTALS = TABLE_AT + ISLAND_TABLE_ARGUMENTS, ERROR, STATUS, ISLANDS };
+    if (!is_island_table(&a[TABLE_AT]))
+        return false;
+    const mbma_variant variant = variant_of(&a[VARIANT]);
+    const mbma_island_table table = island_table_of(&a[TABLE_AT]);
+    *answer = (long long)mbma_island_totals(a[HURST].count, a[HURST].items, a[ZETA_1].items,
+                                            a[COMPRESSION].items, a[PEAK].items, a[RTOL].real,
+                                            &variant, &table, mbma_island_answers, a[TOTALS].items,
+                                            a[ERROR].items, a[STATUS].items, a[ISLANDS].items);
+    return true;
+}
+
 /* ---- cells.c ---- */
 
 /* Whether coefficients end with those of the last cell. */
@@ -890,6 +904,7 @@ static bool do_spectra_separation(const argument *a, long long *answer) {
     FN(island_bands, "Dn Dn Dn D8 wn wn wn wn") \
     FN(island_places, "Dn Dn Dn Dn D8 wn wn wn wn wn wn wn") \
     FN(island_answers, "Dn Dn Dn Dn Dn " ISLAND_TABLE "wn wn wn") \
+    FN(island_totals, "Dn Dn Dn Dn d D8 " ISLAND_TABLE "w4n wn bn l1") \
     FN(cell_answers, "D J J D L J D D D w i w w l") \
     FN(profile_islands, "Dn d d d D8 " TABLE "w4n w1") \
     FN(profile_missed, PANELS "d wn") \

@@ -193,7 +193,7 @@ size_t mbma_island_answers(size_t n, const double *X, const double *spread, cons
                            double *restrict phi_A, double *restrict error) {
     size_t bad = 0;
     for (size_t k = 0; k < n; k += CHUNK)
-        fill_answers(t, n - k < CHUNK ? n - k : CHUNK, X + k, spread + k, sphere + k, hurst + k, mu + k, phi_F + k,
+        fill_answers(t, n - k < CHUNK ? n - k : (size_t)CHUNK, X + k, spread + k, sphere + k, hurst + k, mu + k, phi_F + k,
                      phi_A + k, error + k);
     for (size_t k = 0; k < n; k++)
         bad += error[k] != error[k];
@@ -208,7 +208,15 @@ mbma_status mbma_island_lookup(const mbma_island_table *t, double approach, doub
     const size_t bad = mbma_island_answers(1, &X, &spread, &sphere, &hurst, &mu, t, &out[0], &out[1], &out[2]);
     out[0] *= force;
     out[1] *= area;
-    if (bad)
-        return X == X ? MBMA_OUTSIDE : MBMA_INVALID;
-    return MBMA_OK;
+    if (!bad)
+        return MBMA_OK;
+    if (!(fabs(X) < INFINITY))
+        return MBMA_INVALID;
+    if (!(hurst >= t->low[3] && hurst <= t->high[3]))
+        return MBMA_HURST_OUTSIDE;
+    if (!(sphere >= t->low[2] && sphere <= t->high[2]))
+        return MBMA_ZETA_D_OUTSIDE;
+    if (!(spread <= t->high[1]))
+        return MBMA_SPREAD_ABOVE;
+    return X < t->low[0] ? MBMA_X_BELOW : X > t->high[0] ? MBMA_X_ABOVE : MBMA_OUTSIDE;
 }

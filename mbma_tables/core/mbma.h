@@ -17,13 +17,16 @@ extern "C" {
 #endif
 
 typedef enum {
-    MBMA_OK = 0,         /* the results are valid */
-    MBMA_X_BELOW = 1,    /* X is below the range of the table */
-    MBMA_X_ABOVE = 2,    /* X is above the range of the table */
-    MBMA_MU_ABOVE = 3,   /* mu is above the range of the table */
-    MBMA_UNRESOLVED = 4, /* a quadrature or an iteration did not reach its tolerance */
-    MBMA_INVALID = 5,    /* an argument is NaN, infinite or outside what the model allows */
-    MBMA_OUTSIDE = 6     /* outside what a table or a law covers */
+    MBMA_OK = 0,             /* the results are valid */
+    MBMA_X_BELOW = 1,        /* X is below the range of the table */
+    MBMA_X_ABOVE = 2,        /* X is above the range of the table */
+    MBMA_MU_ABOVE = 3,       /* mu is above the range of the table */
+    MBMA_UNRESOLVED = 4,     /* a quadrature or an iteration did not reach its tolerance */
+    MBMA_INVALID = 5,        /* an argument is NaN, infinite or outside what the model allows */
+    MBMA_OUTSIDE = 6,        /* outside what a table or a law covers */
+    MBMA_SPREAD_ABOVE = 7,   /* zeta_u/zeta_d - 1 is above the range of the table */
+    MBMA_ZETA_D_OUTSIDE = 8, /* zeta_d is outside the range of the table, which depends on H */
+    MBMA_HURST_OUTSIDE = 9   /* H is outside the range of the table */
 } mbma_status;
 
 /* ---- totals.c: islands by the universal table, and force and area of surfaces ------------------------------------ */
@@ -107,9 +110,19 @@ size_t mbma_island_answers(size_t n, const double *X, const double *spread, cons
                            const double *mu, const mbma_island_table *table, double *phi_F, double *phi_A,
                            double *error);
 
-/* F_hat = F^i q0/(E* s), A_hat = A^i q0^2/eta and the bound on their relative error, of one island. */
+/* F_hat = F^i q0/(E* s), A_hat = A^i q0^2/eta and the bound on their relative error, of one island; the status says which
+ * of the table's axes does not reach it. */
 mbma_status mbma_island_lookup(const mbma_island_table *table, double approach, double zeta_d, double zeta_u,
                                double hurst, double out[3]);
+
+/* As mbma_totals, with the islands of a table of four numbers; `answers` is mbma_island_answers. */
+typedef size_t mbma_island_function(size_t n, const double *X, const double *spread, const double *sphere,
+                                    const double *hurst, const double *mu, const mbma_island_table *table,
+                                    double *phi_F, double *phi_A, double *error);
+size_t mbma_island_totals(size_t n, const double *hurst, const double *zeta_1, const double *compression,
+                          const double *peak, double rtol, const mbma_variant *variant, const mbma_island_table *table,
+                          mbma_island_function *answers, double *out, double *error, uint8_t *status,
+                          int64_t *islands);
 
 /* ---- cells.c: tables of any function ------------------------------------------------------------------------------ */
 

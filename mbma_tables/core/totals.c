@@ -43,7 +43,11 @@ typedef struct {
     double compression, peak; /* (h_max - d)/h_rms and h_max/h_rms */
     double safety, table_error;
     int64_t islands;
+    /* the universal table; or one of four numbers, its function, and the Hurst exponent */
     const mbma_cells *cells;
+    const mbma_island_table *table;
+    mbma_island_function *answers;
+    double hurst;
     rule r;
 } gap;
 
@@ -54,10 +58,11 @@ typedef struct {
     double sums[2][2]; /* of force and area: value, and derivative by the compression */
 } interval;
 
-/* Numbers at the nodes of a rule: X, mu, what force and area add per Phi_F and Phi_A, and how both rise with the
- * compression. */
+/* Numbers at the nodes of a rule: X, mu, logarithms of zeta_d and of zeta_u/zeta_d, what force and area add per Phi_F and
+ * Phi_A, and how both rise with the compression. */
 typedef struct {
-    double X[MOST_NODES], mu[MOST_NODES], weight[2][MOST_NODES], rise[MOST_NODES];
+    double X[MOST_NODES], mu[MOST_NODES], log_d[MOST_NODES], width[MOST_NODES];
+    double weight[2][MOST_NODES], rise[MOST_NODES];
 } at_nodes;
 
 /* A loop over the nodes of an interval that vectorises: the floors are constants, nothing is called. */
@@ -77,10 +82,38 @@ MBMA_INLINE void fill_nodes(bool floor_d, bool floor_u, const interval *p, const
         const double weight = n.count * stretch * (exponent > LEAST ? gaussian : 0.0);
         out->X[k] = n.X;
         out->mu[k] = n.mu;
+        out->log_d[k] = n.log_d;
+        out->width[k] = n.width;
         out->weight[0][k] = n.force * weight;
         out->weight[1][k] = n.area * weight;
         out->rise[k] = height * g->s.rms_over_s * n.narrowness;
     }
+}
+
+/* Phi_F and Phi_A of islands, and the largest error of the table so far. */
+static int look_up(gap *g, size_t n, const at_nodes *at, double values[2][MOST_NODES]) {
+    if (!g->table) {
+        for (size_t k = 0; k < n; k++) {
+            const phi found = phi_at(g->cells, at->X[k], at->mu[k]);
+            if (found.status != MBMA_OK)
+                return found.status;
+            g->table_error = mbma_max(g->table_error, found.error);
+            values[0][k] = found.value[0];
+            values[1][k] = found.value[1];
+        }
+        return MBMA_OK;
+    }
+    double spread[MOST_NODES], sphere[MOST_NODES], hurst[MOST_NODES], error[MOST_NODES];
+    for (size_t k = 0; k < n; k++) {
+        spread[k] = mbma_expm1(at->width[k]);
+        sphere[k] = mbma_exp((4.0 - 2.0 * g->hurst) * (mbma_log(MBMA_SPHERE_FLOOR) - at->log_d[k]));
+        hurst[k] = g->hurst;
+    }
+    if (g->answers(n, at->X, spread, sphere, hurst, at->mu, g->table, values[0], values[1], error))
+        return MBMA_OUTSIDE;
+    for (size_t k = 0; k < n; k++)
+        g->table_error = mbma_max(g->table_error, error[k]);
+    return MBMA_OK;
 }
 
 /* The pieces of [0, compression] between the kinks; their number. */
@@ -104,7 +137,7 @@ static int first_intervals(const gap *g, interval *intervals) {
 /* One Kronrod rule over an interval: its sums, with K1 (47), and their relative error. */
 static int apply_rule(interval *p, gap *g) {
     const rule *const r = &g->r;
-    double sums[2][2] = {{0.0}}, gauss[2] = {0.0};
+    double sums[2][2] = {{0.0}}, gauss[2] = {0.0}, values[2][MOST_NODES];
     at_nodes at;
     /* loops of their own for compilers, with constants */
     if (p->floor_d && p->floor_u)
@@ -116,16 +149,15 @@ static int apply_rule(interval *p, gap *g) {
     else
         fill_nodes(false, false, p, r, g, &at);
     g->islands += COUNT;
+    const int status = look_up(g, COUNT, &at, values);
+    if (status != MBMA_OK)
+        return status;
     for (int k = 0; k < COUNT; k++) {
-        const phi found = phi_at(g->cells, at.X[k], at.mu[k]);
-        if (found.status != MBMA_OK)
-            return found.status;
-        g->table_error = mbma_max(g->table_error, found.error);
         for (int q = 0; q < 2; q++) {
-            const double term = at.weight[q][k] * found.value[q], share = r->kronrod[k] * at.weight[q][k];
+            const double term = at.weight[q][k] * values[q][k], share = r->kronrod[k] * at.weight[q][k];
             sums[q][0] = mbma_fma(r->kronrod[k], term, sums[q][0]);
             gauss[q] = mbma_fma(r->gauss[k], term, gauss[q]);
-            sums[q][1] += share * found.value[q] * at.rise[k];
+            sums[q][1] += share * values[q][k] * at.rise[k];
         }
     }
     /* the larger of both: both integrands are resolved alike, and one may agree by chance */
@@ -185,15 +217,20 @@ static int total(gap *g, double rtol, double sums[2][2], double *bound) {
 }
 
 /* What the upper limit adds to the derivatives by the compression: the integrands of force and area there. */
-static int add_ends(const gap *g, double sums[2][2]) {
+static int add_ends(gap *g, double sums[2][2]) {
     const surface *const s = &g->s;
     const island n = island_at(g->compression, g->compression >= s->kink_d, g->compression > s->kink_u, s);
-    const phi found = phi_at(g->cells, n.X, n.mu);
+    double values[2][MOST_NODES];
+    at_nodes at;
+    at.X[0] = n.X, at.mu[0] = n.mu, at.log_d[0] = n.log_d, at.width[0] = n.width;
+    const int status = look_up(g, 1, &at, values);
+    if (status != MBMA_OK)
+        return status;
     const double height = height_of(g->peak, &n, s), K1 = g->compression > s->kink_d ? 1.0 : s->jacobian;
     const double weight = n.count * exp(-0.5 * height * height);
-    sums[0][1] += K1 * (n.force * found.value[0] * weight);
-    sums[1][1] += K1 * (n.area * found.value[1] * weight);
-    return found.status;
+    sums[0][1] += K1 * (n.force * values[0][0] * weight);
+    sums[1][1] += K1 * (n.area * values[1][0] * weight);
+    return MBMA_OK;
 }
 
 /* QUADPACK's Gauss-Kronrod rule of 31 nodes (Piessens, de Doncker-Kapenga, Ueberhuber and Kahaner 1983), which is
@@ -224,14 +261,13 @@ static rule whole_rule(void) {
     return r;
 }
 
-size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const double *compression, const double *peak,
-                   double rtol, const mbma_variant *v, const mbma_cells *cells, double *out, double *error,
-                   uint8_t *status, int64_t *islands) {
+/* Totals by the tables of `settings`. */
+static size_t fill_totals(const gap *settings, size_t n, const double *hurst, const double *zeta_1,
+                          const double *compression, const double *peak, double rtol, const mbma_variant *v,
+                          double *out, double *error, uint8_t *status, int64_t *islands) {
     double own_hurst = NAN, own_zeta_1 = NAN;
     size_t bad = 0;
-    gap g;
-    memset(&g, 0, sizeof g);
-    g.cells = cells;
+    gap g = *settings;
     g.safety = v->floor_d >= PAPER_FLOOR ? SAFETY : SAFETY_BELOW;
     g.r = whole_rule();
     for (size_t k = 0; k < n; k++) {
@@ -240,6 +276,7 @@ size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const do
         error[k] = 0.0;
         g.compression = compression[k];
         g.peak = peak[k];
+        g.hurst = hurst[k];
         if (!(hurst[k] > 0.0 && hurst[k] <= 1.0 && zeta_1[k] > v->floor_u && zeta_1[k] <= MBMA_MAX_ZETA_1 &&
               fabs(g.compression) < INFINITY && g.peak > 0.0 && g.peak < INFINITY))
             found = MBMA_INVALID;
@@ -261,6 +298,26 @@ size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const do
     }
     *islands = g.islands;
     return bad;
+}
+
+size_t mbma_totals(size_t n, const double *hurst, const double *zeta_1, const double *compression, const double *peak,
+                   double rtol, const mbma_variant *v, const mbma_cells *cells, double *out, double *error,
+                   uint8_t *status, int64_t *islands) {
+    gap g;
+    memset(&g, 0, sizeof g);
+    g.cells = cells;
+    return fill_totals(&g, n, hurst, zeta_1, compression, peak, rtol, v, out, error, status, islands);
+}
+
+size_t mbma_island_totals(size_t n, const double *hurst, const double *zeta_1, const double *compression,
+                          const double *peak, double rtol, const mbma_variant *v, const mbma_island_table *table,
+                          mbma_island_function *answers, double *out, double *error, uint8_t *status,
+                          int64_t *islands) {
+    gap g;
+    memset(&g, 0, sizeof g);
+    g.table = table;
+    g.answers = answers;
+    return fill_totals(&g, n, hurst, zeta_1, compression, peak, rtol, v, out, error, status, islands);
 }
 
 int mbma_island_geometry(double approach, double hurst, double zeta_1, const mbma_variant *v, mbma_island *out) {

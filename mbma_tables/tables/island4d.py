@@ -122,14 +122,15 @@ class Island4dModel(OfTable):
         self._X, self._spread, _, self._hurst = content.axes
 
     @shared_property
-    def _core_table(self) -> tuple[Any, ...]:
+    def core_table(self) -> tuple[Any, ...]:
+        """The table in the core's format, see `core_table`."""
         own = self.content
         return core_table(own.axes, own.coefficients, own.local_error, self.variant)
 
     @shared_property
     def _one(self) -> Any:
         """Of one island of four floats its lookup, None outside the table and for other types."""
-        return core.Table(*self._core_table).at
+        return core.Table(*self.core_table).at
 
     def lookup(
         self,
@@ -282,7 +283,7 @@ class Island4dModel(OfTable):
         Below the table's spread log(Phi/Phi_rigid) is proportional to mu.
         """
         given = *place[:4], place.mu
-        out = filled(core.island_answers, given, 3, *self._core_table)
+        out = filled(core.island_answers, given, 3, *self.core_table)
         missing = np.isnan(out[2])
         if not missing.any():
             return out

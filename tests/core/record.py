@@ -133,7 +133,9 @@ def use():
     one = Surface(0.7, 0.2, 60.0, 1.0, 3.0)
     many = Surface(np.linspace(0.3, 1.0, 40), 0.2, np.geomspace(0.7, 4000, 40), 1.0, 3.0)
     assert contact(one, separation=[0.5, 1.0]).stiffness.all()
-    contact(many, separation=np.linspace(-2, 2.9, 40), theory=Mbma(rtol=1e-6))
+    for model, outside in (("universal", "raise"), ("island4d", "nan")):
+        theory = Mbma(model, rtol=1e-6, outside=outside)
+        contact(many, separation=np.linspace(-2, 2.9, 40), theory=theory)
     law = contact_law(one, theory="mbma")
     gaps = np.linspace(-2.9, 2.9, 100)
     for quantity in (law.pressure, law.area, law.stiffness, law.area_slope, law.energy):

@@ -128,7 +128,7 @@ def test_a_table_as_an_object_is_made_once_of_arrays_that_nothing_changes():
     model = open_table("island4d")
     for arrays, island in (
         (open_table("universal").cells, (2.0, 1e-3)),
-        (model._core_table, (1.0, 3.0, 20.0, 0.8)),
+        (model.core_table, (1.0, 3.0, 20.0, 0.8)),
     ):
         table = core.Table(*arrays)
         assert len(table.at(*island)) == 3
@@ -151,11 +151,11 @@ def test_a_table_as_an_object_is_made_once_of_arrays_that_nothing_changes():
             changed[k] = None
             with pytest.raises(ValueError, match=r"match|read-only"):
                 core.Table(*changed)
-    wrong = model._core_table[2].copy()
+    wrong = model.core_table[2].copy()
     wrong[1] = -5
     wrong.flags.writeable = False
     with pytest.raises(ValueError, match="or numbers of items in them"):
-        core.Table(*model._core_table[:2], wrong, *model._core_table[3:])
+        core.Table(*model.core_table[:2], wrong, *model.core_table[3:])
     with pytest.raises(TypeError, match="an island is not 2 numbers"):
         core.Table.__new__(core.Table).at(1.0, 2.0)
 

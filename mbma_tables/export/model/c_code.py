@@ -13,7 +13,7 @@ import re
 import subprocess
 import tempfile
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +22,13 @@ from mbma_tables import __version__
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
-from mbma_tables.export.model.conformance import FORM, POINTS_FILE, points_text
+from mbma_tables.export.model.conformance import (
+    FORM,
+    POINTS_FILE,
+    IslandTable,
+    lookup_kind,
+    points_text,
+)
 from mbma_tables.export.targets import Target
 from mbma_tables.export.text import (
     about,
@@ -34,8 +40,10 @@ from mbma_tables.export.text import (
     opening,
     written_by,
 )
+from mbma_tables.islands.island_models import MIN_RTOL
 from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.surfaces.spectrum import MAX_ZETA_1
+from mbma_tables.tables.island4d import Island4dModel
 from mbma_tables.tables.open import open_table, universal_model
 from mbma_tables.tables.universal import RECORD, UniversalModel
 from mbma_tables.theories import persson
@@ -43,6 +51,7 @@ from mbma_tables.theories.calibrated import table as calibrated_table
 from mbma_tables.theories.calibrated.formulas import LAW_ERROR, YANG_PERSSON
 from mbma_tables.theories.mbma.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.theories.mbma.closed_forms import FUNCTIONS
+from mbma_tables.theories.mbma.models import get_model
 from mbma_tables.theories.mbma.sums import QUADRATURE_SHARE
 
 CORE = (
@@ -50,6 +59,15 @@ CORE = (
     "calibrated.c",
     "spectrum_laws.c",
 )  # and the headers that they include
+ISLANDS = "island4d.c"  # beside `CORE`, for tables of four numbers
+# of the tables' arrays
+TYPES = {
+    "MBMA_CELLS": "mbma_cell",
+    "MBMA_PLACES": "int32_t",
+    "MBMA_COEFFICIENTS": "float",
+    "MBMA_ERRORS": "float",
+    "MBMA_SPLINE": "float",
+}
 MODEL = ("mbma_model.h", "mbma_model.c", "mbma_data.c")
 SELFTEST = "mbma_selftest.c"
 SOURCES = (*CORE, *MODEL[1:], SELFTEST)
@@ -57,7 +75,7 @@ TIMEOUT = 300.0  # seconds, of a build or a replay
 # flags of the library; rounding does not depend on the compiler
 FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
 USAGE = (
-    f"Compile with cc {' '.join(FLAGS)} -march=native -c {' '.join(CORE)} mbma_model.c mbma_data.c, and link the C "
+    f"Compile with cc {' '.join(FLAGS)} -march=native -c {{}} mbma_model.c mbma_data.c, and link the C "
     "mathematics library; mbma_model.h has the calls of one surface, mbma.h those of arrays. Every function may be "
     "called from any thread; nothing is allocated and nothing is kept between calls."
 )
@@ -76,10 +94,15 @@ CONVENTIONS = (
 )
 
 
-def core_texts() -> dict[str, str]:
-    """The core's own files that exports hold, unchanged: those of `CORE` and all that they include."""
+def core_sources(model: IslandTable) -> tuple[str, ...]:
+    """The core's own sources that the model of a table needs."""
+    return (*CORE, ISLANDS) if isinstance(model, Island4dModel) else CORE
+
+
+def core_texts(names: Iterable[str] = CORE) -> dict[str, str]:
+    """The core's own files that exports hold, unchanged: those of these names and all that they include."""
     texts: dict[str, str] = {}
-    wanted = list(CORE)
+    wanted = list(names)
     while wanted:
         name = wanted.pop()
         if name not in texts:
@@ -88,7 +111,7 @@ def core_texts() -> dict[str, str]:
     return dict(sorted(texts.items()))
 
 
-def source_texts(model: UniversalModel, variant: Variant) -> dict[str, str]:
+def source_texts(model: IslandTable, variant: Variant) -> dict[str, str]:
     """Names and texts of the source files."""
     if variant.addition != "sum":
         raise InputError(
@@ -97,20 +120,23 @@ def source_texts(model: UniversalModel, variant: Variant) -> dict[str, str]:
     heads = {
         name: opening(header(name, model, variant), "/*") for name in (*MODEL, SELFTEST)
     }
+    is_of_four = isinstance(model, Island4dModel)
     texts = (
-        core_texts()
-        | model_texts(heads)
+        core_texts(core_sources(model))
+        | model_texts(heads, is_of_four)
         | {"mbma_data.c": f"{heads['mbma_data.c']}\n{data_text(model, variant)}"}
     )
-    return texts | {SELFTEST: filled(f"model/{SELFTEST}", HEADER=heads[SELFTEST])}
+    parts = {"FOUR": is_of_four, "LOOKUP": lookup_kind(model), "HEADER": heads[SELFTEST]}
+    return texts | {SELFTEST: filled(f"model/{SELFTEST}", **parts)}
 
 
-def model_texts(heads: dict[str, str]) -> dict[str, str]:
+def model_texts(heads: dict[str, str], is_of_four: bool = False) -> dict[str, str]:
     """The calls of one surface, under the opening comments of their files."""
     form = RANGES[FORM]
     certificates = CERTIFICATES[FORM]
     prototypes, forms = closed_forms()
     parts = {
+        "FOUR": is_of_four,
         "PROTOTYPES": prototypes,
         "CLOSED_FORMS": forms,
         "FORM_X_LOW": number(form["X"][0]),
@@ -152,10 +178,17 @@ def closed_forms() -> tuple[str, str]:
     return prototypes, re.sub(r"(\d)e0\b", r"\1.0", "\n".join(lines))
 
 
-def tables(model: UniversalModel) -> dict[str, Any]:
+def tables(model: IslandTable) -> dict[str, Any]:
     """The arrays of the tables by their names in C."""
-    cells, places, _ = model.cells
     spline = calibrated_table.shipped().core_table[0]
+    if isinstance(model, Island4dModel):
+        coefficients, errors, *_ = model.core_table
+        return {
+            "MBMA_COEFFICIENTS": coefficients,
+            "MBMA_ERRORS": errors,
+            "MBMA_SPLINE": spline,
+        }
+    cells, places, _ = model.cells
     return {
         "MBMA_CELLS": cells.reshape(-1, RECORD),
         "MBMA_PLACES": places,
@@ -163,13 +196,35 @@ def tables(model: UniversalModel) -> dict[str, Any]:
     }
 
 
-def data_text(model: UniversalModel, variant: Variant, later: bool = False) -> str:
+def table_type(model: IslandTable) -> str:
+    """The type of a table of islands in C."""
+    return "mbma_island_table" if isinstance(model, Island4dModel) else "mbma_cells"
+
+
+def island_table(model: IslandTable) -> str:
+    """The initialiser of a table of islands."""
+    if isinstance(model, Island4dModel):
+        cells, numbers, variant = model.core_table[2:]
+        by_axis = np.split(numbers[:-1], 4)  # first node, rate, low and high
+        (offset,) = numerals(numbers[-1])
+        names = "MBMA_COEFFICIENTS", "MBMA_ERRORS"
+        return braces(*names, cells, *by_axis, offset, _variant(variant))
+    X = model.cells[2][:4]
+    buckets = model.cells[2][4:].astype(int)
+    return braces("MBMA_CELLS", "MBMA_PLACES", *numerals(X), *numerals(buckets))
+
+
+def _variant(numbers: FloatArray) -> str:
+    """The initialiser of a variant of the equations."""
+    return braces(*numerals(numbers[:5]), *numerals(numbers[5:].astype(int)))
+
+
+def data_text(model: IslandTable, variant: Variant, later: bool = False) -> str:
     """The tables, and the variant of the equations; with `later` as variables, for a program to fill in."""
     lines = ['#include "mbma_model.h"']
     law = calibrated_table.shipped()
-    for (name, values), kind in zip(
-        tables(model).items(), ("mbma_cell", "int32_t", "float"), strict=True
-    ):
+    for name, values in tables(model).items():
+        kind = TYPES[name]
         head = f"{kind} {name}[{len(values)}]"
         body = (
             _cells if kind == "mbma_cell" else lambda numbers: _wrapped(numerals(numbers))
@@ -179,9 +234,6 @@ def data_text(model: UniversalModel, variant: Variant, later: bool = False) -> s
             if later
             else ["", f"static const {head} = {{", *body(values), "};"]
         )
-    X = model.cells[2][:4]
-    buckets = model.cells[2][4:].astype(int)
-    flags = variant.numbers[5:].astype(int)
     spline = (
         "MBMA_SPLINE",
         law.cells,
@@ -195,14 +247,10 @@ def data_text(model: UniversalModel, variant: Variant, later: bool = False) -> s
         for constants in (YANG_PERSSON, law.constants)
     ]
     values = {
-        "mbma_cells CELLS": braces(
-            "MBMA_CELLS", "MBMA_PLACES", *numerals(X), *numerals(buckets)
-        ),
+        f"{table_type(model)} CELLS": island_table(model),
         "mbma_calibrated_table LAW": braces(braces(*spline), *numerals(theories[1][:3])),
         "mbma_law_constants THEORIES[]": braces(*theories),
-        "mbma_variant MBMA_VARIANT": braces(
-            *numerals(variant.numbers[:5]), *numerals(flags)
-        ),
+        "mbma_variant MBMA_VARIANT": _variant(variant.numbers),
     }
     held = (
         f"{'' if later and 'MBMA' in name else 'static const '}{name} = {text};"
@@ -212,7 +260,7 @@ def data_text(model: UniversalModel, variant: Variant, later: bool = False) -> s
         "",
         *held,
         "",
-        "const mbma_cells *mbma_table(void) { return &CELLS; }",
+        f"const {table_type(model)} *mbma_table(void) {{ return &CELLS; }}",
         "const mbma_calibrated_table *mbma_law_table(void) { return &LAW; }",
         "const mbma_variant *mbma_model_variant(void) { return &MBMA_VARIANT; }",
         "const mbma_law_constants *mbma_theory(int theory) { return &THEORIES[theory == MBMA_CALIBRATED]; }",
@@ -239,11 +287,12 @@ def _cells(cells: FloatArray) -> Iterator[str]:
             )
 
 
-def header(name: str, model: UniversalModel, variant: Variant) -> list[str]:
+def header(name: str, model: IslandTable, variant: Variant) -> list[str]:
     """Paragraphs of a file's opening comment: origin, contents, variant, range, errors, conventions, licence."""
     content = model.content
     law = calibrated_table.shipped()
-    found, (X, mu) = content.attributes, content.axes
+    found = content.attributes
+    sources = " ".join(core_sources(model))
     worst, visited = (
         max(float(found[f"{which}largest_error_{of}"]) for of in ("F", "A"))
         for which in ("", "visited_")
@@ -258,16 +307,15 @@ def header(name: str, model: UniversalModel, variant: Variant) -> list[str]:
     ]
     return [
         f"{name}: part of the MBMA model and the calibrated law of rough contact as source code.",
-        f"Written by mbma_tables {__version__}. {USAGE}",
-        "MBMA model of rough contact (Guo, Ma and Zhu): Phi_F and Phi_A of a contact island over (X, mu) by local "
-        "polynomials or a closed form, islands of a self-affine surface, and the surface's force and area at a gap.",
+        f"Written by mbma_tables {__version__}. {USAGE.format(sources)}",
+        f"MBMA model of rough contact (Guo, Ma and Zhu): {_contents(model)}, or by a closed form of X and mu, islands "
+        "of a self-affine surface, and the surface's force and area at a gap.",
         f"Variant: {variant.name} (density divisor {number(variant.density_divisor)}, beta {number(variant.beta)}, "
         f"phi {number(variant.phi)}, floors {number(variant.floor_d)} and {number(variant.floor_u)}, "
         f"Jacobian {variant.jacobian}, offset "
         f"{'on' if variant.offset else 'off'}, sigma of {'summits' if variant.summit_sigma else 'all heights'}).",
         f"Table: data {found['values_sha256']}",
-        f"Range: {about(X.low, 6)} <= X <= {about(X.high, 6)}, 0 <= mu <= {about(mu.high, 6)}; "
-        f"H in (0, 1], zeta_1 up to {number(MAX_ZETA_1)}.",
+        f"Range: {_range(model)}, zeta_1 up to {number(MAX_ZETA_1)}.",
         f"Largest relative error of the table against the solved model: {about(worst, 2)} on "
         f"{found['certificate_points']} held-out points, {about(visited, 2)} at islands of random surfaces; "
         "each answer carries its own bound.",
@@ -286,14 +334,42 @@ def header(name: str, model: UniversalModel, variant: Variant) -> list[str]:
     ]
 
 
-def _two_numbers(table: os.PathLike[str] | str) -> UniversalModel:
-    """The model of a universal table's file; a four-parameter table is refused."""
-    model = open_table(table)
-    if not isinstance(model, UniversalModel):
-        raise InputError(
-            f"{table} is a table of the paper's four numbers, the C is of a universal one: make that by "
-            "`mbma tables make universal --out FILE.nc`"
+def _contents(model: IslandTable) -> str:
+    """What the table of islands has."""
+    if isinstance(model, Island4dModel):
+        return (
+            "force and area of a contact island over (delta/h_rms, zeta_d, zeta_u, H) by a quintic "
+            "spline"
         )
+    return "Phi_F and Phi_A of a contact island over (X, mu) by local polynomials"
+
+
+def _range(model: IslandTable) -> str:
+    """What the table of islands covers."""
+    if isinstance(model, Island4dModel):
+        X, spread, sphere, hurst = model.content.axes
+        return (
+            f"{about(X.low, 6)} <= X = (delta zeta_d^H/h_rms - 1)/sigma <= {about(X.high, 6)}, "
+            f"0 < zeta_u/zeta_d - 1 <= {about(spread.high, 6)}, "
+            f"{about(sphere.low, 6)} <= (1.25/zeta_d)^(4 - 2 H) <= {about(sphere.high, 6)}, "
+            f"{about(hurst.low, 6)} <= H <= {about(hurst.high, 6)}"
+        )
+    X, mu = model.content.axes
+    return (
+        f"{about(X.low, 6)} <= X <= {about(X.high, 6)}, 0 <= mu <= {about(mu.high, 6)}; "
+        "H in (0, 1]"
+    )
+
+
+def _table_of(table: os.PathLike[str] | str, variant: Variant) -> IslandTable:
+    """The model of a table, which must be of islands, and of this variant where it is of one."""
+    model = open_table(table)
+    if not isinstance(model, UniversalModel | Island4dModel):
+        raise InputError(
+            f"{table} is a table of a function, the C is of contact islands: make a table of these by "
+            "`mbma tables make universal --out FILE.nc`, or island4d"
+        )
+    get_model(model, MIN_RTOL, variant)  # refuses another variant by name
     return model
 
 
@@ -305,7 +381,13 @@ def write_code(
     """Write the model as C11, which C++ compiles too, with conformance points and a self-test that replays them.
 
     A missing folder is made, files of the same names are replaced. Returns the files written.
-    `table` is the file of a universal table to write in place of the shipped one.
+    `table` is the file of a table to write in place of the shipped universal one; with a table
+    of four numbers, which may be "island4d", `mbma_lookup_of` takes the place of `mbma_phi_of`.
+
+    Raises
+    ------
+    InputError
+        For a table that was made for another variant, or is not of islands.
 
     Examples
     --------
@@ -314,7 +396,7 @@ def write_code(
     ['mbma_model.h', 'mbma_model.c', 'mbma_data.c', 'mbma_selftest.c', 'mbma_conformance.csv']
     """
     rule = get_variant(variant)
-    model = universal_model() if table is None else _two_numbers(table)
+    model = universal_model() if table is None else _table_of(table, rule)
     texts = source_texts(model, rule) | {POINTS_FILE: points_text(model, rule)}
     for name, text in texts.items():
         write_file(pathlib.Path(folder, name), text.encode(), make_folders=True)
@@ -396,6 +478,7 @@ def check(
                 "cc",
                 *FLAGS,
                 *(str(place / name) for name in SOURCES),
+                *map(str, place.glob(ISLANDS)),
                 "-lm",
                 "-o",
                 "selftest",

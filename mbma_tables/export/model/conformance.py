@@ -16,24 +16,29 @@ from mbma_tables.export.text import comment, number
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.islands.variants import Variant
 from mbma_tables.surfaces.surface import Surface
+from mbma_tables.tables.island4d import SPHERE_FLOOR, Island4dModel, to_axes
 from mbma_tables.tables.open import universal_model
+from mbma_tables.tables.schema import ARGUMENTS, ISLAND4D
 from mbma_tables.tables.universal import UniversalModel
 from mbma_tables.theories.mbma.closed_forms import FormulaModel
 from mbma_tables.theories.mbma.sums import Sums, by_table
 from mbma_tables.theories.mbma.theory import Mbma
 
 Rows = Iterator[str]
+IslandTable = UniversalModel | Island4dModel
 FORM = "standard"  # the form of island model "formula"
 POINTS_FILE = "mbma_conformance.csv"
 KINDS = {
-    "phi": "X, mu; phi_F, phi_A, the bound on their error",
     "geometry": f"approach, hurst, zeta_1; {', '.join(FIELDS)}",
     "total": "hurst, q0, q1, h_rms, h_max, separation, E_star, rtol; force, area, stiffness, error",
-    "status": "X, mu; the status",
+    "status": "the same arguments; the status",
     "formula": "X, mu; phi_F, phi_A by the closed form, its error",
     "calibrated": "hurst, q0, q1, h_rms, h_max, mean separation, E_star; force, area, stiffness, error",
     "separation": "hurst, q0, q1, h_rms, h_max, force, E_star; mean separation by the calibrated law",
 }
+# of the first kind, "phi" or of a table of four numbers "lookup"
+PHI = "X, mu; phi_F, phi_A, the bound on their error"
+LOOKUP = "delta/h_rms, zeta_d, zeta_u, hurst; F_hat, A_hat, the bound on their error"
 TOLERANCE = 1e-11
 ANY = 1e300  # what the difference of a number that may be any is relative to
 # of mbma.h
@@ -42,6 +47,9 @@ X_BELOW = 1
 X_ABOVE = 2
 MU_ABOVE = 3
 INVALID = 5
+SPREAD_ABOVE = 7
+ZETA_D_OUTSIDE = 8
+HURST_OUTSIDE = 9
 SURFACES = (
     # hurst, q0, q1, h_rms, h_max
     (0.8, 1.0, 1e2, 1.0, 3.5),
@@ -88,8 +96,13 @@ def formula_rows(X: FloatArray, mu: FloatArray) -> Rows:
     yield from rows("formula", np.array([X, mu])[:, inside], found[:, inside])
 
 
+def lookup_kind(model: IslandTable) -> str:
+    """The kind of points of a table's own lookups."""
+    return "lookup" if isinstance(model, Island4dModel) else "phi"
+
+
 def covered(
-    model: UniversalModel, surface: Surface, variant: Variant, gaps: FloatArray
+    model: IslandTable, surface: Surface, variant: Variant, gaps: FloatArray
 ) -> Any:
     """Whether a table covers all islands of a surface, at each of its gaps."""
     theory = Mbma(model, variant, RTOL, outside="nan")
@@ -103,7 +116,7 @@ def surface_rows(
     depths: Any,
     shares: Any,
     E_star: float = 1.0,
-    table: UniversalModel | None = None,
+    table: IslandTable | None = None,
 ) -> Rows:
     """Islands and totals of one surface, gap by gap, and the calibrated law at shares of h_max, by the library."""
     own = Surface(*surface)
@@ -143,19 +156,13 @@ def surface_rows(
         yield from rows("separation", (*surface, found.pressure, E_star), (u,))
 
 
-def points_text(model: UniversalModel, variant: Variant) -> str:
-    """The points' file: the table's own, and the runtime's islands, totals, refusals and calibrated law."""
+def universal_rows(model: UniversalModel) -> Rows:
+    """Lookups, statuses and closed forms of a table of X and mu."""
     points, (X, mu) = model.content.conformance, model.content.axes
     places = points["X"], points["mu"]
-    head = [
-        f"conformance points of the MBMA model, variant {variant.name}",
-        f"data {model.content.attributes['values_sha256']}",
-        "a row: kind, tolerance, how many arguments, these; each answer and what its difference is taken relative to",
-        *(f"{kind}: {meaning}" for kind, meaning in KINDS.items()),
-    ]
     # with the results and tolerances that are stored in the table
     known = points["table_F"], points["table_A"], model.answer(*places).error
-    lines = [*rows("phi", places, known, None, points["tolerance"])]
+    yield from rows("phi", places, known, None, points["tolerance"])
     middle = 0.5 * (X.low + X.high)
     some = min(1.0, mu.high)
     statuses = {
@@ -172,10 +179,73 @@ def points_text(model: UniversalModel, variant: Variant) -> str:
     statuses |= dict.fromkeys(
         [(math.nan, 1.0), (middle, math.nan), (middle, -1e-300)], INVALID
     )
-    lines += [
-        *rows("status", np.array([*statuses]).T, [[*statuses.values()]]),
-        *formula_rows(*places),
+    yield from rows("status", np.array([*statuses]).T, [[*statuses.values()]])
+    yield from formula_rows(*places)
+
+
+def four_rows(model: Island4dModel) -> Rows:
+    """Lookups, statuses and closed forms of a table of the paper's four numbers."""
+    points = model.content.conformance
+    delta, zeta_d, zeta_u, hurst = (points[name] for name in ARGUMENTS[ISLAND4D])
+    places = delta, zeta_d, zeta_u, hurst
+    error = model.lookup(delta, zeta_d, zeta_u, hurst).error
+    known = points["table_F"], points["table_A"], error
+    yield from rows("lookup", places, known, None, points["tolerance"])
+    statuses = _statuses_of_four(model)
+    yield from rows("status", np.array([*statuses]).T, [[*statuses.values()]])
+    place = to_axes(delta, zeta_d, zeta_u, hurst, model.variant)
+    yield from formula_rows(place.X, place.mu)
+
+
+def _statuses_of_four(model: Island4dModel) -> dict[tuple[float, ...], int]:
+    """An island of a table and others beyond each of its axes, with what a lookup says of them."""
+    X, spread, sphere, hurst = model.content.axes
+    points = model.content.conformance
+    delta, zeta_d, zeta_u, H = (float(points[name][0]) for name in ARGUMENTS[ISLAND4D])
+    island = np.array([delta, zeta_d, zeta_u, H])
+    approach, low, high, exponent = island[:, None]
+    sigma = float(to_axes(approach, low, high, exponent, model.variant).sigma[0])
+    below, above = (
+        (1 + depth * sigma) * zeta_d**-H for depth in (X.low - 0.01, X.high + 0.01)
+    )
+    wide = zeta_d * (1 + 1.01 * spread.high)
+    nearest = SPHERE_FLOOR * (1.01 * sphere.high) ** (-1 / (4 - 2 * H))
+    statuses: dict[tuple[float, ...], int] = {
+        (delta, zeta_d, zeta_u, H): OK,
+        (below, zeta_d, zeta_u, H): X_BELOW,
+        (above, zeta_d, zeta_u, H): X_ABOVE,
+        (delta, zeta_d, wide, H): SPREAD_ABOVE,
+        (delta, nearest, 2 * nearest, H): ZETA_D_OUTSIDE,
+        (delta, zeta_d, zeta_u, 0.99 * hurst.low): HURST_OUTSIDE,
+        (delta, zeta_d, zeta_d, H): INVALID,
+        (delta, 0.9, zeta_u, H): INVALID,
+        (math.inf, zeta_d, zeta_u, H): INVALID,
+    }
+    for missing in range(4):
+        wrong = island.copy()
+        wrong[missing] = math.nan
+        statuses[tuple(wrong.tolist())] = INVALID
+    return statuses
+
+
+def table_rows(model: IslandTable) -> Rows:
+    """Lookups, statuses and closed forms of a table."""
+    if isinstance(model, UniversalModel):
+        return universal_rows(model)
+    return four_rows(model)
+
+
+def points_text(model: IslandTable, variant: Variant) -> str:
+    """The points' file: the table's own, and the runtime's islands, totals, refusals and calibrated law."""
+    kind = lookup_kind(model)
+    kinds = {kind: LOOKUP if kind == "lookup" else PHI} | KINDS
+    head = [
+        f"conformance points of the MBMA model, variant {variant.name}",
+        f"data {model.content.attributes['values_sha256']}",
+        "a row: kind, tolerance, how many arguments, these; each answer and what its difference is taken relative to",
+        *(f"{kind}: {meaning}" for kind, meaning in kinds.items()),
     ]
+    lines = [*table_rows(model)]
     for surface in SURFACES:
         if surface[2] / surface[1] > max(3.0, variant.floor_u):
             approach = np.geomspace(1e-3, 2 * surface[4] / surface[3], 8)

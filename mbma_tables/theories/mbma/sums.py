@@ -22,6 +22,7 @@ from mbma_tables.islands.island_models import AnyModel, exact_model
 from mbma_tables.islands.variants import Variant
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
+from mbma_tables.tables.island4d import Island4dModel
 from mbma_tables.tables.universal import UniversalModel
 from mbma_tables.theories.mbma.profile import Shape, profile
 
@@ -183,11 +184,11 @@ def by_table(
     surface: Surface,
     compression: FloatArray,
     places: NDArray[np.intp],
-    model: UniversalModel,
+    model: UniversalModel | Island4dModel,
     how: Sums,
     rows: FloatArray,
 ) -> tuple[int, NDArray[np.intp]]:
-    """The same by the universal table, gap by gap; the number of islands, and places left out."""
+    """The same by a table, gap by gap; the number of islands, and places left out."""
     shape = compression.shape
     peak = surface.h_max / surface.h_rms
     arguments = [
@@ -198,11 +199,18 @@ def by_table(
     status = np.empty(places.size, np.uint8)
     # force and area, each with its slope
     sums = np.empty((places.size, 2, 2))
-    options = QUADRATURE_SHARE * how.rtol, how.variant.numbers, *model.cells
+    call = core.totals
+    table: tuple[Any, ...]
+    if isinstance(model, UniversalModel):
+        table = model.cells
+    else:
+        call = core.island_totals
+        table = model.core_table
+    options = QUADRATURE_SHARE * how.rtol, how.variant.numbers, *table
 
     def fill(block: slice) -> int:
         count = np.zeros(1, np.int64)
-        core.totals(
+        call(
             *(argument[block] for argument in arguments),
             *options,
             sums[block],
@@ -229,8 +237,8 @@ def _sums(
 ) -> tuple[FloatArray, int]:
     """Force, area, perhaps slopes of both by the compression, and their error as rows.
 
-    With the number of islands. By profiles of islands; of many surfaces by the universal
-    table gap by gap.
+    With the number of islands. By profiles of islands; of many surfaces by a table gap by
+    gap.
     """
     size = depth.size
     compression = np.asarray(depth / surface.h_rms)
@@ -239,7 +247,7 @@ def _sums(
     islands = 0
     why: Exception | None = None
     ranges = ""
-    table = how.model if isinstance(how.model, UniversalModel) else None
+    table = how.model if isinstance(how.model, UniversalModel | Island4dModel) else None
     has_table = isinstance(surface, Surface) and table is not None
 
     few = max(FEW_SURFACES, size // MANY_GAPS)
@@ -252,8 +260,7 @@ def _sums(
         more, left = by_table(surface, compression, left, table, how, rows)
         islands += more
         why = None
-        X, mu = table.content.axes
-        ranges = f" ({X.low:g} <= X <= {X.high:g}, mu <= {mu.high:g})"
+        ranges = _ranges(table)
     if left.size and how.outside == "exact":
         exact = exact_model(how.rtol)
         more, left, why = _by_profiles(surface, compression, left, exact, how, rows)
@@ -262,6 +269,15 @@ def _sums(
         raise _not_covered(surface, depth, left, how.model, ranges, why)
     rows[:, left] = np.nan
     return rows, islands
+
+
+def _ranges(table: UniversalModel | Island4dModel) -> str:
+    """What a table covers, for the message of an error."""
+    texts = []
+    for axis in table.content.axes:
+        low = "" if axis.name == "mu" else f"{axis.low:g} <= "
+        texts.append(f"{low}{axis.name} <= {axis.high:g}")
+    return f" ({', '.join(texts)})"
 
 
 def _not_covered(

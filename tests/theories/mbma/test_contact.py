@@ -219,3 +219,38 @@ def test_many_surfaces_keep_their_bound_where_sums_agree_by_chance(
             np.abs(getattr(found, name) / getattr(known, name) - 1) <= found.error
         ).all()
     assert found.error.max() <= rtol
+
+
+def test_many_surfaces_by_the_four_number_table_are_summed_as_each_alone():
+    """Each needed a profile of its own, 0.9 ms a surface."""
+    rng = np.random.default_rng(4)
+    hurst = rng.uniform(0.35, 0.95, 40)
+    zeta_1 = rng.uniform(20, 500, 40)
+    surfaces = Surface(hurst, 2.0, zeta_1, 0.1, 0.35)
+    separation = rng.uniform(-0.1, 0.3, 40)
+    theory = Mbma("island4d")
+    found = contact(surfaces, separation=separation, theory=theory)
+    exact = contact(surfaces, separation=separation, theory=Mbma("exact"))
+    for name in ("pressure", "area"):
+        difference = np.abs(getattr(found, name) / getattr(exact, name) - 1)
+        assert (difference <= found.error + exact.error).all()
+    for k in range(5):
+        one = Surface(hurst[k], 2.0, zeta_1[k], 0.1, 0.35)
+        alone = contact(one, separation=separation[k], theory=theory)
+        assert found.pressure[k] == pytest.approx(alone.pressure, rel=1e-6)
+        assert found.stiffness[k] == pytest.approx(alone.stiffness, rel=1e-6)
+
+
+def test_many_surfaces_of_which_the_four_number_table_lacks_some():
+    hurst = np.where(np.arange(40) == 7, 0.2, 0.8)
+    surfaces = Surface(hurst, 2.0, 200.0, 0.1, 0.35)
+    with pytest.raises(OutOfRangeError, match=r"0\.3 <= hurst <= 1\)") as caught:
+        contact(surfaces, separation=0.1, theory=Mbma("island4d"))
+    assert caught.value.mask.nonzero()[0].tolist() == [7]
+    left = contact(surfaces, separation=0.1, theory=Mbma("island4d", outside="nan"))
+    assert np.isnan(left.pressure).nonzero()[0].tolist() == [7]
+    solved = contact(surfaces, separation=0.1, theory=Mbma("island4d", outside="exact"))
+    exact = contact(
+        Surface(0.2, 2.0, 200.0, 0.1, 0.35), separation=0.1, theory=Mbma("exact")
+    )
+    assert solved.pressure[7] == pytest.approx(exact.pressure, rel=1e-7)
