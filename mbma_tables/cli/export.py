@@ -89,7 +89,7 @@ class _Export(click.Command):
 @options.variant_option
 @click.option(
     "--table",
-    help="Of the whole model: FILE.nc of a universal table, in place of the shipped one.",
+    help="Of the whole model: FILE.nc of a table, or island4d, in place of the shipped universal one.",
 )
 @click.option(
     "--check",
@@ -102,6 +102,7 @@ def export_command(target: str, out: Path, asked: dict[str, Any], **values: Any)
     Solvers and data take a surface, a modulus and units, and so do laws as code (-law),
     subroutines of solvers (abaqus-uinter, abaqus-gapcon, calculix-gapcon), and an FMU of
     FMI 2 (fmu); c is the whole model as code, of the paper's variants reported and printed.
+    A --table of four numbers is of one variant, and has mbma_lookup_of in place of mbma_phi_of.
 
     Example: mbma export calculix --surface concrete --E-star 13.3MPa --out law.inp
     """

@@ -7,6 +7,7 @@ import subprocess
 
 import numpy as np
 import pytest
+import tabulated  # noqa: F401, by its name
 from click.testing import CliRunner
 from small_tables import small_table
 
@@ -15,6 +16,7 @@ from mbma_tables.cli import main
 from mbma_tables.common.errors import InputError
 from mbma_tables.export.model.c_code import read_report, write_code
 from mbma_tables.tables.island4d import to_axes
+from mbma_tables.tables.make_function import make, wanted_of
 from mbma_tables.tables.open import open_table
 from mbma_tables.tables.writer import write_table
 from mbma_tables.theories import Mbma
@@ -45,7 +47,7 @@ def test_c_of_a_table_of_ones_own(tmp_path):
     assert digest in (folder / "mbma_conformance.csv").read_text()
     (folder / "own.c").write_text(PROGRAM)
     page = (ROOT / "docs" / "tables.md").read_text()
-    (line,) = re.findall(r"cc own\.c .* -o own", page)  # as the page has it
+    line, _ = re.findall(r"cc own\.c .* -o own", page)  # as the page has it
     subprocess.run(line.split(), cwd=folder, check=True)
     text = subprocess.run(["./own"], cwd=folder, check=True, capture_output=True).stdout
     status, *phi = map(float, text.split())
@@ -269,6 +271,32 @@ def test_the_command_exports_and_checks_a_table_of_four_numbers(four, tmp_path):
     header = (tmp_path / "c" / "mbma_model.h").read_text()
     assert "mbma_lookup_of" in header
     assert "mbma_phi_of" not in header
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+def test_the_program_of_the_page(tmp_path):
+    page = (ROOT / "docs" / "tables.md").read_text()
+    _, program = re.findall(r"```c\n(.*?)```", page, re.DOTALL)
+    _, line = re.findall(r"cc own\.c .* -o own", page)
+    write_code(tmp_path, table="island4d")
+    (tmp_path / "own.c").write_text(program)
+    subprocess.run(line.split(), cwd=tmp_path, check=True)
+    done = subprocess.run(
+        ["./own"], cwd=tmp_path, check=True, capture_output=True, text=True
+    )
+    found = open_table("island4d").lookup(1.0, 3.0, 20.0, 0.8)
+    assert f"F = {found.F_hat:g} E* s/q0, A = {found.A_hat:g} eta/q0^2" in done.stdout
+    assert f"at most {found.error:.1e}" in done.stdout
+
+
+def test_a_table_of_a_function_is_refused_with_what_exports_it(tmp_path):
+    file = tmp_path / "mine.nc"
+    axes = dict.fromkeys("abcdef", {"low": 0.0, "high": 1.0})
+    make(wanted_of({"axes": axes, "target": 1e-2}, "tabulated:six"), file)
+    with pytest.raises(
+        InputError, match=r"mine\.nc is a table of a function.*tables export"
+    ):
+        write_code(tmp_path / "c", table=file)
 
 
 def test_a_table_of_another_variant_is_refused_by_name(four, tmp_path):

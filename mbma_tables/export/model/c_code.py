@@ -366,8 +366,8 @@ def _table_of(table: os.PathLike[str] | str, variant: Variant) -> IslandTable:
     model = open_table(table)
     if not isinstance(model, UniversalModel | Island4dModel):
         raise InputError(
-            f"{table} is a table of a function, the C is of contact islands: make a table of these by "
-            "`mbma tables make universal --out FILE.nc`, or island4d"
+            f"{table} is a table of a function, this C is of contact islands: `mbma tables export c` writes "
+            "that of a function"
         )
     get_model(model, MIN_RTOL, variant)  # refuses another variant by name
     return model

@@ -73,7 +73,7 @@ def get_model(island_model: str | AnyModel, rtol: float, variant: Variant) -> An
         variant.summit_sigma,
     ):
         raise InputError(
-            f"the {model.name} table was made for the variant {made_for.name!r}, not for {variant.name!r}; "
-            "island model 'universal' serves every variant"
+            f"the {model.name} table was made for the variant {made_for.name!r}, not for {variant.name!r}: "
+            "give its variant, or island model 'universal', which serves every variant"
         )
     return model
