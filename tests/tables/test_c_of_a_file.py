@@ -291,7 +291,7 @@ def test_the_program_of_the_page(tmp_path):
 
 def test_a_table_of_a_function_is_refused_with_what_exports_it(tmp_path):
     file = tmp_path / "mine.nc"
-    axes = dict.fromkeys("abcdef", {"low": 0.0, "high": 1.0})
+    axes = {name: {"low": 0.0, "high": 1.0} for name in "abcdef"}
     make(wanted_of({"axes": axes, "target": 1e-2}, "tabulated:six"), file)
     with pytest.raises(
         InputError, match=r"mine\.nc is a table of a function.*tables export"
