@@ -36,6 +36,11 @@ def four(x, y, z, w):
     return 1 / (1 + x + 2 * y * z + w * w)
 
 
+def bent(x, y=1.0, z=1.0):
+    """Two outputs of one, two or three numbers, whose polynomials are not exact."""
+    return np.exp(x * y * z), np.sin(3 * x * y + z)
+
+
 def single(x):
     """One point a call."""
     return {"square": float(x) ** 2, "cube": float(x) ** 3}

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import sympy
-from matplotlib.colors import LogNorm
 
 from benchmarks.import_circles import import_graph
 from generate.boundary_elements.evidence import evidence
@@ -27,14 +26,9 @@ from mbma_tables import Surface, contact
 from mbma_tables.common.plots import draw_compression, theory_label
 from mbma_tables.design.scenes.plan import shipped_costs, shipped_distances
 from mbma_tables.tables.open import shipped
+from mbma_tables.tables.picture import draw_errors
 from mbma_tables.tables.reader import read_table
-from mbma_tables.tables.schema import (
-    CELL_EDGES,
-    ISLAND4D,
-    KINDS,
-    UNIVERSAL,
-    TableContent,
-)
+from mbma_tables.tables.schema import ISLAND4D, KINDS, UNIVERSAL, TableContent
 from mbma_tables.theories import THEORIES
 from mbma_tables.theories.mbma.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.theories.mbma.closed_forms import FUNCTIONS, Function
@@ -137,7 +131,7 @@ def architecture() -> Measured:
 
 def tables() -> Measured:
     contents = {kind: read_table(shipped(kind), kind) for kind in KINDS}
-    figure = drawn_errors(contents[UNIVERSAL])
+    figure = draw_errors(contents[UNIVERSAL])
     parts = {"sizes": _sizes(contents), "axes": _axes(contents[ISLAND4D])}
     return parts, {"docs/figures/tables_universal_error.svg": figure}
 
@@ -171,30 +165,6 @@ def _axes(content: TableContent) -> str:
         )
     header = "axis | what it is | equally spaced in | first | last | nodes"
     return table(header, rows, "{} | {} | {} | {:g}")
-
-
-def drawn_errors(content: TableContent) -> Figure:
-    """Bound on the relative error of the universal table over X and mu.
-
-    At the middles of its cells.
-    """
-    X_low, X_high, mu_low, mu_high = (content.auxiliary[name][1] for name in CELL_EDGES)
-    X = (X_low + X_high) / 2
-    mu = (mu_low + mu_high) / 2
-    figure, axes = panels(1, 2, (9, 3.6), sharey=True)
-    norm = LogNorm(content.local_error.min(), content.local_error.max())
-    names = (r"$\Phi_F$", r"$\Phi_A$")
-    for plot, errors, name in zip(axes, content.local_error.T, names, strict=True):
-        dots = plot.scatter(X, mu, c=errors, s=5, norm=norm, rasterized=True)
-        plot.set(
-            yscale="log",
-            xlim=(X_low[0], 12),
-            xlabel="X",
-            title=f"bound on the relative error of {name}",
-        )
-    axes[0].set(ylabel=r"$\mu$", ylim=(1e-3, mu_high[-1]))
-    figure.colorbar(dots, ax=axes)
-    return figure
 
 
 def _where(condition: sympy.Basic, a: sympy.Expr, b: sympy.Expr) -> sympy.Piecewise:

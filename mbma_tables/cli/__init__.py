@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from mbma_tables import __version__
-from mbma_tables.cli import commands, export, formula, scene, tables
+from mbma_tables.cli import commands, contents, export, formula, scene, tables
 from mbma_tables.cli.options import format_options
 from mbma_tables.common import progress
 from mbma_tables.common.errors import MbmaError
@@ -95,7 +95,11 @@ def main(context: click.Context) -> None:
     progress.doing(context.invoked_subcommand)
 
 
-tables.tables_group.add_command(formula.formula_command)
+for command in (
+    *(contents.show_command, contents.sample_command, contents.plot_command),
+    formula.formula_command,
+):
+    tables.tables_group.add_command(command)
 
 for command in (
     *(

@@ -1,6 +1,5 @@
-"""`mbma tables`: make tables, show their contents and verify their files; and `mbma cache`, stored simulations."""
+"""`mbma tables`: make tables, export and verify their files; and `mbma cache`, stored simulations."""
 
-import functools
 import json
 import os
 import re
@@ -10,22 +9,19 @@ from typing import Any
 
 import click
 
-from mbma_tables.cli.format import Report
-from mbma_tables.cli.options import Output, json_option, numbers_option, output_options
+from mbma_tables.cli.options import json_option
 from mbma_tables.common import cache
 from mbma_tables.common.arguments import nearest
 from mbma_tables.common.errors import InputError, TableFileError
-from mbma_tables.common.files import write_file, written_bytes
-from mbma_tables.common.netcdf import OWN, OWN_REMEDY, holds_own, read_own
+from mbma_tables.common.files import write_file
+from mbma_tables.common.netcdf import OWN, OWN_REMEDY, holds_own
 from mbma_tables.common.progress import echo
-from mbma_tables.islands.island_models import OUTSIDE
-from mbma_tables.tables.reader import read_table
-from mbma_tables.tables.schema import KINDS, UNIVERSAL
+from mbma_tables.tables.schema import KINDS
 
 FAITHFUL = 1e-6  # relative, of an own table's curves at the loads they go through
 
 
-def _place(name: str) -> tuple[Path, str | None]:
+def place_of(name: str) -> tuple[Path, str | None]:
     """Path and kind of a table; for a file, whose kind is unknown, None."""
     from mbma_tables.tables.open import shipped
 
@@ -36,7 +32,8 @@ def _place(name: str) -> tuple[Path, str | None]:
     return (shipped(name), name) if name in KINDS else (Path(name), None)
 
 
-def _show(content: Any, lines: Iterable[str], as_json: bool) -> None:
+def print_facts(content: Any, lines: Iterable[str], as_json: bool) -> None:
+    """Print facts as JSON, or lines of text."""
     echo(json.dumps(content, indent=2) if as_json else "\n".join(lines))
 
 
@@ -72,7 +69,7 @@ def _verified(table: str) -> tuple[dict[str, Any], str]:
             found,
             f"{table}: hashes match; {loads} simulated loads: curves within {error:.1e}",
         )
-    v = verify(*_place(table))
+    v = verify(*place_of(table))
     solver = (
         f"within {v.solver_error:.1e}" if v.solver_error else "identical to the last bit"
     )
@@ -258,83 +255,6 @@ def merge_command(out: Path, folders: tuple[Path, ...]) -> None:
     echo(f"{out}: {table!r}")
 
 
-@tables_group.command("info")
-@click.argument("table")
-@json_option("lines")
-def info_command(table: str, as_json: bool) -> None:
-    """Axes or variables, and attributes, of TABLE (a kind or a file)."""
-    entries: dict[str, Any]
-    if holds_own(table):
-        values, attributes = read_own(table)
-        kind = "variables"
-        entries = {name: [float(v.min()), float(v.max())] for name, v in values.items()}
-        lines = [
-            f"variable {name}: {values[name].size} numbers, {a:g} to {b:g}"
-            for name, (a, b) in entries.items()
-        ]
-    else:
-        content = read_table(*_place(table))
-        kind = "axes"
-        attributes = content.attributes
-        entries = {
-            axis.name: {**axis.attributes(), "nodes": axis.nodes} for axis in content.axes
-        }
-        # the universal table has cells, not nodes
-        text = "axis {name}: {long_name}, {first:g} to {last:g}"
-        text += "" if content.kind == UNIVERSAL else ", {nodes} nodes, {position_formula}"
-        lines = [text.format(name=name, **axis) for name, axis in entries.items()]
-    lines += [f"{name}: {value}" for name, value in attributes.items()]
-    _show({kind: entries, "attributes": attributes}, lines, as_json)
-
-
-@tables_group.command("sample")
-@click.argument("table")
-@numbers_option("--delta", help="Approach over h_rms, of a table of four numbers,")
-@numbers_option("--zeta-d", help="lower magnification,")
-@numbers_option("--zeta-u", help="upper magnification,")
-@numbers_option("--hurst", help="and Hurst exponent.")
-@numbers_option("--X", "X", help="Depth, of a table of two numbers,")
-@numbers_option("--mu", help="and stiffness of the roughness.")
-@click.option(
-    "--outside",
-    type=click.Choice(OUTSIDE),
-    default="raise",
-    show_default=True,
-    help="Where the table has no island: an error, the exact solver, or NaN.",
-)
-@output_options
-def sample_command(
-    table: str, output: Output, outside: str, **axes: list[float] | None
-) -> None:
-    """Force, area and error of TABLE (a kind or a file) at all combinations of the numbers.
-
-    Combinations with zeta_u <= zeta_d are no islands, and NaN with --outside nan.
-    With --out FILE.nc it is a netCDF file.
-
-    Example: mbma tables sample universal --X 1,2 --mu 0.1
-    """
-    from mbma_tables.tables.open import open_islands
-
-    model = open_islands(table)
-    needed = ("X", "mu") if model.name == UNIVERSAL else tuple(axes)[:4]
-    given = {name: values for name, values in axes.items() if values is not None}
-    if set(given) != set(needed):
-        raise InputError(
-            f"a table of kind {model.name} takes {', '.join(needed)}, "
-            f"got {', '.join(given) or 'none'}"
-        )
-    found = model.to_dataset(**given, outside=outside)
-    if output.out is not None and output.out.suffix == ".nc":
-        write = functools.partial(found.to_netcdf, engine="netcdf4")
-        write_file(output.out, written_bytes("sample.nc", write))
-        return
-    columns = found.to_dataframe(dim_order=list(needed)).reset_index()
-    values = {str(name): columns[name].to_numpy() for name in columns}
-    facts = {"table": table, "data_version": model.content.attributes["data_version"]}
-    title = f"islands of {table}"
-    Report("tables sample", title, [], facts, values, {"error": "relative"}).write(output)
-
-
 @tables_group.command("verify")
 @click.argument("tables", nargs=-1)
 @json_option("lines")
@@ -345,7 +265,7 @@ def verify_command(tables: tuple[str, ...], as_json: bool) -> None:
     with the stored answers; of a table of your own surface the simulated loads are.
     """
     verdicts, lines = zip(*map(_verified, tables or KINDS), strict=True)
-    _show({"tables": verdicts}, lines, as_json)
+    print_facts({"tables": verdicts}, lines, as_json)
 
 
 @click.command("cache", short_help="Simulations that are kept.")
@@ -372,7 +292,7 @@ def cache_command(clear: bool, as_json: bool) -> None:
     line = f"{place}: {len(kept)} files, {size} bytes" + (
         f"; {removed} removed" if clear else ""
     )
-    _show(
+    print_facts(
         facts,
         [f"nothing is kept: {cache.VARIABLE} is off" if place is None else line],
         as_json,

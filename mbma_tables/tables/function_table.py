@@ -204,6 +204,20 @@ class FunctionTable:
         order = boxes[np.argsort(branches[boxes, 1])]
         return order, low[order], high[order]
 
+    def cells(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Lower and upper ends of the cells in coordinates of the axes, and stored bounds.
+
+        Returns
+        -------
+        low, high : ndarray, shape (cells, axes)
+            Coordinates on which the axes are tabulated; `FunctionAxis.from_grid` has the
+            arguments.
+        errors : ndarray, shape (cells, outputs)
+            Bounds on the errors, relative or absolute as each output says.
+        """
+        _, low, high = self._ends
+        return low.copy(), high.copy(), self._arrays["errors"].copy()
+
     def _columns(
         self, given: tuple[ArrayLike, ...], named: Mapping[str, ArrayLike]
     ) -> list[ArrayLike]:
