@@ -216,7 +216,7 @@ class FunctionTable:
             Bounds on the errors, relative or absolute as each output says.
         """
         _, low, high = self._ends
-        return low.copy(), high.copy(), self._arrays["errors"].copy()
+        return low.copy(), high.copy(), self.arrays["errors"].copy()
 
     def _columns(
         self, given: tuple[ArrayLike, ...], named: Mapping[str, ArrayLike]
