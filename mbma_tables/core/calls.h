@@ -818,6 +818,12 @@ static bool do_words_of_spectrum_numbers(const argument *a, long long *answer) {
     return true;
 }
 
+static bool do_most_wave_words(const argument *a, long long *answer) {
+    (void)a;
+    *answer = 3 * MBMA_MOST_WAVES;
+    return true;
+}
+
 static bool do_spectra_of(const argument *a, long long *answer) {
     enum { ALPHA, H_MAX, LAWS, CONSTANTS, INNER_AT };
     enum { WAVES = INNER_AT + INNER_ARGUMENTS, NUMBERS };
@@ -825,15 +831,13 @@ static bool do_spectra_of(const argument *a, long long *answer) {
     if (surfaces == 0 || !is_inner(&a[INNER_AT]))
         return false;
     const size_t parts = a[LAWS].count / surfaces / MBMA_PART_NUMBERS;
-    const size_t most = a[WAVES].count / surfaces / 3;
     if (a[LAWS].count != surfaces * parts * MBMA_PART_NUMBERS || parts > MBMA_MOST_PARTS ||
-        a[WAVES].count != surfaces * most * 3 ||
         a[NUMBERS].count != surfaces * WORDS(mbma_spectrum_numbers))
         return false;
     const mbma_inner inner = inner_of(&a[INNER_AT]);
     *answer = (long long)mbma_spectra_of(surfaces, parts, a[LAWS].items, a[ALPHA].items,
-                                         a[H_MAX].items, a[CONSTANTS].items, &inner, most,
-                                         a[WAVES].items, a[NUMBERS].items);
+                                         a[H_MAX].items, a[CONSTANTS].items, &inner,
+                                         a[WAVES].count, a[WAVES].items, a[NUMBERS].items);
     return true;
 }
 
@@ -845,15 +849,14 @@ enum { SPECTRA_ARGUMENTS = SPECTRA_INNER + INNER_ARGUMENTS };
 static bool are_spectra(const argument *a) {
     const size_t surfaces = a[SPECTRA_NUMBERS].count / WORDS(mbma_spectrum_numbers);
     return surfaces > 0 && is_inner(&a[SPECTRA_INNER]) &&
-           a[SPECTRA_NUMBERS].count == surfaces * WORDS(mbma_spectrum_numbers) &&
-           a[SPECTRA_WAVES].count % (3 * MBMA_WAVE_CHUNK * surfaces) == 0;
+           a[SPECTRA_NUMBERS].count == surfaces * WORDS(mbma_spectrum_numbers);
 }
 
 static mbma_spectra spectra_of(const argument *a) {
     const size_t surfaces = a[SPECTRA_NUMBERS].count / WORDS(mbma_spectrum_numbers);
     return (mbma_spectra){
         .count = surfaces,
-        .most = a[SPECTRA_WAVES].count / (3 * surfaces),
+        .words = a[SPECTRA_WAVES].count,
         .waves = a[SPECTRA_WAVES].items,
         .numbers = a[SPECTRA_NUMBERS].items,
         .area_t0 = a[SPECTRA_T0].real,
@@ -929,6 +932,7 @@ static bool do_spectra_separation(const argument *a, long long *answer) {
     FN(spectrum_law_contact, "D Dn wn wn wn") \
     FN(spectrum_law_separation, "D Dn i wn wn") \
     FN(words_of_spectrum_numbers, "") \
+    FN(most_wave_words, "") \
     FN(spectra_of, "Dn Dn D D7 " INNER "w w") \
     FN(spectra_contact, SPECTRA "Ln Dn wn wn wn") \
     FN(spectra_separation, SPECTRA "Ln Dn wn")

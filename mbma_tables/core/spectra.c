@@ -173,9 +173,9 @@ typedef struct {
 /* Where wavenumbers are written to. */
 typedef struct {
     const mbma_inner *inner;
-    size_t count, most;
-    double *place, *fall, *share;
+    size_t count;
     wave_sums sums;
+    double place[MBMA_MOST_WAVES], fall[MBMA_MOST_WAVES], share[MBMA_MOST_WAVES];
 } wave_list;
 
 /* Wavenumbers of a panel; `before` of the squared gradient is below it, and all is moments[1]. */
@@ -232,7 +232,7 @@ static bool fill_waves(const sum_of_parts *s, const double moments[3], wave_list
             const double after = before + integral(&here, 2, width), g = sqrt(after / moments[1]);
             const double share = (g - sqrt(before / moments[1])) * moments[1] / unit * mbma_exp(-t);
             const gauss_rule *const rule = rule_for(share, g);
-            if (!(after > before) || list->count + (size_t)rule->count > list->most)
+            if (!(after > before) || list->count + NODES > MBMA_MOST_WAVES)
                 return false;
             add_panel(&here, width, before, moments, rule, list);
             before = after;
@@ -240,8 +240,8 @@ static bool fill_waves(const sum_of_parts *s, const double moments[3], wave_list
         }
     }
     /* what fills the last chunk has no share */
-    for (size_t k = list->count; k % CHUNK != 0; k++)
-        list->place[k] = list->fall[k] = list->share[k] = 0.0;
+    for (; list->count % CHUNK != 0; list->count++)
+        list->place[list->count] = list->fall[list->count] = list->share[list->count] = 0.0;
     return list->count > 0;
 }
 
@@ -257,14 +257,14 @@ typedef struct {
 } own_sum;
 
 static void open_sum(own_sum *s, const mbma_inner *inner, const mbma_spectrum_numbers *numbers,
-                     const double *waves, size_t most) {
+                     const double *waves) {
     const double less = numbers->narrowness - inner->narrowness;
     s->inner = inner;
     s->numbers = numbers;
-    s->place = waves;
-    s->fall = waves + most;
-    s->share = waves + 2 * most;
-    s->count = numbers->count > 0.0 ? (size_t)numbers->count : 0;
+    s->count = (size_t)numbers->count;
+    s->place = waves + (size_t)numbers->first;
+    s->fall = s->place + s->count;
+    s->share = s->fall + s->count;
     for (size_t k = 0; k < inner->cells * TERMS; k++)
         s->p[k] = mbma_fma(less, inner->slopes[k], inner->polynomials[k]);
 }
@@ -345,8 +345,8 @@ static double log_force_at(const own_sum *s, double u, double *slope) {
 static double tail_at(const own_sum *s, double u) { return s->numbers->tail * u * u * u; }
 
 /* Numbers of a surface from its wavenumbers; `end` is still to be found. */
-static mbma_spectrum_numbers numbers_of(const wave_list *list, double alpha, double h_max,
-                                        const mbma_law_constants *c) {
+static mbma_spectrum_numbers numbers_of(const wave_list *list, double first, double alpha,
+                                        double h_max, const mbma_law_constants *c) {
     const mbma_inner *const inner = list->inner;
     const wave_sums *const sums = &list->sums;
     const double narrowness = sums->variance * sums->variance / (sums->mean * sums->inverse);
@@ -357,6 +357,7 @@ static mbma_spectrum_numbers numbers_of(const wave_list *list, double alpha, dou
     const double middle = inner->first + 0.5 / inner->rate;
     const mbma_spectrum_numbers found = {
         .count = (double)list->count,
+        .first = first,
         .narrowness = narrowness,
         .s0 = mbma_min(c->area_s0 + c->area_slope * log(alpha / 10.0), 1.0),
         .tail = c->tail * (1.0 - narrowness),
@@ -368,30 +369,50 @@ static mbma_spectrum_numbers numbers_of(const wave_list *list, double alpha, dou
     return found;
 }
 
+/* Wavenumbers of one surface's parts; false where they are no spectrum. */
+static bool resolve(size_t parts, const double *laws, const mbma_inner *inner, wave_list *list) {
+    static const wave_sums NOTHING = {0.0, 0.0, 0.0, 0.0, 0.0};
+    sum_of_parts s;
+    double moments[3];
+    list->inner = inner;
+    list->count = 0;
+    list->sums = NOTHING;
+    if (!read_parts(parts, laws, &s))
+        return false;
+    moments_of(&s, moments);
+    return moments[0] > 0.0 && moments[1] > 0.0 && moments[1] < INFINITY &&
+           fill_waves(&s, moments, list);
+}
+
 size_t mbma_spectra_of(size_t n, size_t parts, const double *laws, const double *alpha,
                        const double *h_max, const mbma_law_constants *constants,
-                       const mbma_inner *inner, size_t most, double *waves,
+                       const mbma_inner *inner, size_t words, double *waves,
                        mbma_spectrum_numbers *numbers) {
-    static const mbma_spectrum_numbers NONE = {0.0, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
-    size_t bad = 0;
+    static const mbma_spectrum_numbers NONE = {0.0, 0.0, NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+    size_t bad = 0, used = 0;
+    wave_list list;
     own_sum own;
     for (size_t k = 0; k < n; k++) {
-        double *const first = waves + 3 * most * k, moments[3], slope;
-        wave_list list = {inner, 0, most, first, first + most, first + 2 * most, {0.0, 0.0, 0.0, 0.0, 0.0}};
-        sum_of_parts s;
-        bool good = read_parts(parts, laws + MBMA_PART_NUMBERS * parts * k, &s) && h_max[k] > 0.0 && alpha[k] > 0.0;
+        bool good = h_max[k] > 0.0 && alpha[k] > 0.0 &&
+                    resolve(parts, laws + MBMA_PART_NUMBERS * parts * k, inner, &list) &&
+                    used + 3 * list.count <= words;
+        numbers[k] = NONE;
         if (good) {
-            moments_of(&s, moments);
-            good = most % CHUNK == 0 && moments[0] > 0.0 && moments[1] > 0.0 && moments[1] < INFINITY && fill_waves(&s, moments, &list);
+            const size_t row = list.count, bytes = row * sizeof(double);
+            numbers[k] = numbers_of(&list, (double)used, alpha[k], h_max[k], constants);
+            memcpy(waves + used, list.place, bytes);
+            memcpy(waves + used + row, list.fall, bytes);
+            memcpy(waves + used + 2 * row, list.share, bytes);
+            used += 3 * row;
         }
-        numbers[k] = good ? numbers_of(&list, alpha[k], h_max[k], constants) : NONE;
         if (good && h_max[k] < FARTHEST) {
-            open_sum(&own, inner, &numbers[k], first, most);
+            double slope;
+            open_sum(&own, inner, &numbers[k], waves);
             numbers[k].end = log_force_at(&own, h_max[k], &slope) - tail_at(&own, h_max[k]);
             good = numbers[k].end == numbers[k].end;
         }
         if (!good)
-            numbers[k] = NONE;
+            numbers[k].count = 0.0;
         bad += !good;
     }
     return bad;
@@ -400,12 +421,16 @@ size_t mbma_spectra_of(size_t n, size_t parts, const double *laws, const double 
 /* Whether the surface of an entry is another one than before; it is opened then. */
 static bool open_owner(const mbma_spectra *spectra, const mbma_inner *inner, int64_t owner,
                        int64_t *opened, own_sum *own) {
-    if (!((uint64_t)owner < spectra->count && spectra->numbers[owner].count > 0.0 &&
-          spectra->numbers[owner].count <= (double)spectra->most))
+    if (!((uint64_t)owner < spectra->count))
+        return false;
+    const mbma_spectrum_numbers *const numbers = &spectra->numbers[owner];
+    const double words = (double)spectra->words;
+    const bool inside = numbers->count > 0.0 && numbers->first >= 0.0 && numbers->count <= words &&
+                        numbers->first <= words - 3.0 * numbers->count;
+    if (!inside || (size_t)numbers->count % CHUNK != 0)
         return false;
     if (owner != *opened)
-        open_sum(own, inner, &spectra->numbers[owner],
-                 spectra->waves + 3 * spectra->most * (size_t)owner, spectra->most);
+        open_sum(own, inner, numbers, spectra->waves);
     *opened = owner;
     return true;
 }

@@ -15,7 +15,8 @@ enum { MBMA_PART_NUMBERS = 4, MBMA_MOST_PARTS = 16 };
 
 /* Numbers of a surface that the loops need beside its wavenumbers. */
 typedef struct {
-    double count;            /* of wavenumbers */
+    double count;            /* of wavenumbers, with those that fill the last chunk */
+    double first;            /* of the numbers of the wavenumbers */
     double narrowness;       /* harmonic over arithmetic mean wavenumber, weighted by variance */
     double s0, tail, h_max;  /* of the area, of forces at large gaps, and of contact */
     double end;              /* ln F at h_max of a surface without end */
@@ -26,29 +27,29 @@ typedef struct {
  * of ln y, the place running from -1 to 1: for the narrowness that constants refer to, and its
  * derivative by that. Below the first cell it is linear in ln y. */
 enum { MBMA_INNER_TERMS = 6, MBMA_MOST_INNER_CELLS = 256 };
-enum { MBMA_WAVE_CHUNK = 32 };
 typedef struct {
     size_t cells;
     double first, rate, narrowness;
     const double *polynomials, *slopes;
 } mbma_inner;
 
-/* Surfaces: `waves` has room for `most` wavenumbers each, a multiple of a chunk, in three rows: the place of ln g among
- * the cells, 1/g^2 - 1, and the share of u; g is the gradient of smaller wavenumbers over that of
- * all. */
+/* Surfaces. The wavenumbers of one are three rows: the place of ln g among the cells, 1/g^2 - 1,
+ * and the share of u; g is the gradient of smaller wavenumbers over that of all. */
 typedef struct {
-    size_t count, most;
+    size_t count, words; /* surfaces, and numbers of all wavenumbers */
     const double *waves;
     const mbma_spectrum_numbers *numbers;
     double area_t0;
 } mbma_spectra;
 
+enum { MBMA_WAVE_CHUNK = 32, MBMA_MOST_WAVES = 2048 };
+
 /* Wavenumbers and numbers of surfaces of `parts` each, of Nayak's alpha `alpha`, whose contact
- * begins at h_max [h_rms], perhaps infinite. Returns how many are no spectra, or need more than
- * `most` wavenumbers; their count is 0. */
+ * begins at h_max [h_rms], perhaps infinite. Returns how many are no spectra, or find no room
+ * among `words` numbers; their count is 0. 3 MBMA_MOST_WAVES words a surface are enough. */
 size_t mbma_spectra_of(size_t n, size_t parts, const double *laws, const double *alpha,
                        const double *h_max, const mbma_law_constants *constants,
-                       const mbma_inner *inner, size_t most, double *waves,
+                       const mbma_inner *inner, size_t words, double *waves,
                        mbma_spectrum_numbers *numbers);
 
 /* As `mbma_calibrated_contact` and `mbma_calibrated_separation`. */

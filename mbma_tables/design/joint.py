@@ -161,8 +161,7 @@ class Joint(JointQuantities, Displayed):
     InputError, OutOfRangeError
         For any argument that a result would refuse later: the names of gas, theory and
         metals, the hardness, the numbers of a face, of which all that are missing are named
-        at once. For batches of two parts whose wavelengths or Hurst exponents differ: the sum
-        of their spectra is no power law, and known of one joint at a time.
+        at once.
 
     Examples
     --------

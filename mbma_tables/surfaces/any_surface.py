@@ -57,6 +57,8 @@ class AnySurface(Displayed, abc.ABC):
         tuple[str, ...]
     ] = ()  # names of the numbers that define it; empty if a spectrum does
 
+    banded: ClassVar[Any]  # `BandedSurface`
+
     # fields in one class, properties in the other; `MEANINGS` describes them
     q0: Any
     q1: Any
@@ -86,9 +88,17 @@ class AnySurface(Displayed, abc.ABC):
         """Reasons why its measurement may not represent the surface; each with a remedy."""
         return tuple(dict.fromkeys(_doubts(self.provenance)))
 
+    def numbers(self) -> dict[str, Any]:
+        """The numbers that define it, by name: `parameters`, or those of a batch of spectra."""
+        return {name: getattr(self, name) for name in self.parameters}
+
     def with_numbers(self, *numbers: Any) -> Self:
-        """The same kind of surface with other `parameters`, in their order."""
+        """The same kind of surface with other `numbers`, in their order."""
         return self
+
+    @abc.abstractmethod
+    def bands_if_few(self) -> tuple[spectrum.Band, ...]:
+        """The power laws that its spectrum is the sum of; none for one of many samples."""
 
     def taken_from(
         self, batch: AnySurface, shape: tuple[int, ...], place: NDArray[np.intp]
@@ -233,6 +243,27 @@ class AnySurface(Displayed, abc.ABC):
         """The sum with a surface in the same unit where it is one power law; None where it is not."""
         return None
 
+    def _bands_with(self, other: AnySurface) -> Any:
+        """The sum with a surface in the same unit, of which at least one is a batch."""
+        bands = [*self.bands_if_few(), *other.bands_if_few()]
+        for one in (self, other):
+            if not one.bands_if_few() or one.resolution:
+                raise InputError(
+                    "a measured surface and a batch are not added, as a spectrum of many samples is "
+                    "known of one surface at a time: combine each entry of the batch with it"
+                )
+        record = {
+            "step": "combined",
+            "of": [list(self.provenance), list(other.provenance)],
+        }
+        tops = self.h_max, other.h_max
+        if any(map(is_labelled, tops)):
+            top = apply(lambda *both: (np.hypot(*both),), tops, outputs=1)[0]
+        else:
+            broadcast_shape(one=self.h_max, other=other.h_max)
+            top = np.hypot(*tops)
+        return self.banded(bands, top, unit=self.unit, provenance=(record,))
+
     def combined(
         self, other: AnySurface, nominal_area: ArrayLike | str | None = None
     ) -> Any:
@@ -247,18 +278,18 @@ class AnySurface(Displayed, abc.ABC):
 
         Returns
         -------
-        Surface or MeasuredSurface
+        Surface, MeasuredSurface or BandedSurface
             In the unit of the first. Of two self-affine surfaces with the same q0, q1 and
-            Hurst exponent a `Surface`, for arrays of them a batch of the broadcast shape;
-            of all others a `MeasuredSurface`. Its h_max is exceeded by as small a share of
-            heights as those of both: for Gaussian surfaces the root of the sum of squares.
+            Hurst exponent a `Surface`; of all others a `MeasuredSurface`, or of arrays a
+            `BandedSurface` of the broadcast shape. Its h_max is exceeded by as small a
+            share of heights as those of both: for Gaussian surfaces the root of the sum of
+            squares.
 
         Raises
         ------
         InputError
-            If only one has a unit.
-        OutOfRangeError
-            For batches of which some entries differ in q0, q1 or Hurst exponent.
+            If only one has a unit, and for a batch with a measured surface, which is known
+            of one surface at a time.
 
         Examples
         --------
@@ -269,16 +300,18 @@ class AnySurface(Displayed, abc.ABC):
         >>> f"h_rms = {both.h_rms:.2f}, h_max = {both.h_max:.1f}, q from {both.q0:g} to {both.q1:g}"
         'h_rms = 5.00, h_max = 15.0, q from 0.01 to 5'
 
-        Many joints at once, of faces that have their band in common:
+        Many joints at once:
 
         >>> ground = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=[0.3, 0.4, 0.5], h_max=2.0)
-        >>> milled = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.2, h_max=5.0)
+        >>> milled = Surface(hurst=0.7, q0=0.05, q1=[3.0, 4.0, 5.0], h_rms=1.2, h_max=5.0)
         >>> ground.combined(milled).h_rms.round(3)
         array([1.237, 1.265, 1.3  ])
         """
         other = other.in_unit_of(self)
         both = self.power_law_with(other)
-        if both is None:
+        if both is None and any(s.labelled or s.shape != () for s in (self, other)):
+            both = self._bands_with(other)
+        elif both is None:
             both = self.sampled().added(other.sampled())
         return (
             both
@@ -339,10 +372,9 @@ def apply_to_surface(
 
     A plain array among DataArrays is an error.
     """
-    count = len(surface.parameters)
-    arguments = {name: getattr(surface, name) for name in surface.parameters} | dict(
-        arrays
-    )
+    numbers_of_surface = surface.numbers()
+    count = len(numbers_of_surface)
+    arguments = numbers_of_surface | dict(arrays)
     refuse_plain(arguments)
 
     def block(*numbers: Any) -> Any:

@@ -231,27 +231,32 @@ def _plain(value: Any) -> Any:
 
 
 def _rolled_off(surface: dict[str, Any], rolloff: FloatArray) -> dict[str, Any]:
-    """Arguments of a surface whose spectrum is flat down to a wavelength."""
-    if rolloff.ndim:
-        raise InputError(f"rolloff is of one surface, got shape {rolloff.shape}")
-    hurst = float(surface.pop("hurst"))
-    q0 = float(surface.pop("q0"))
-    q1 = float(surface.pop("q1"))
-    h_rms = float(surface.pop("h_rms"))
-    start = 2 * math.pi / float(rolloff)
-    good = np.asarray(q0 < start < q1 / spectrum.MIN_ZETA_1)
-    # 6 pi/q1 is 3 times the shortest wavelength
-    allowed = (
-        f"between 3 times shortest, {6 * math.pi / q1:.6g}, "
-        f"and longest, {2 * math.pi / q0:.6g}"
+    """Arguments of a surface whose spectrum is flat down to a wavelength, or of a batch of them."""
+    hurst, q0, q1, h_rms = (
+        np.asarray(surface.pop(name)) for name in ("hurst", "q0", "q1", "h_rms")
     )
+    start = 2 * math.pi / rolloff
+    # 6 pi/q1 is 3 times the shortest wavelength
+    least = describe_entries(6 * math.pi / q1, start >= q1 / spectrum.MIN_ZETA_1)
+    most = describe_entries(2 * math.pi / q0, start <= q0)
+    if rolloff.ndim == 0:
+        least, most = f"{6 * math.pi / q1:.6g}", f"{2 * math.pi / q0:.6g}"
+    good = (q0 < start) & (start < q1 / spectrum.MIN_ZETA_1)
+    allowed = f"between 3 times shortest, {least}, and longest, {most}"
     require("rolloff", rolloff, good, allowed)
     # h_rms^2 = 2 pi level start^2 (flat + law), the integrals of q dq over start^2
     flat = (1 - (q0 / start) ** 2) / 2
-    law = -math.expm1(-2 * hurst * math.log(q1 / start)) / (2 * hurst)
+    law = -np.expm1(-2 * hurst * np.log(q1 / start)) / (2 * hurst)
     level = h_rms**2 / (2 * math.pi * start**2 * (flat + law))
-    C = level * np.array([1.0, 1.0, (q1 / start) ** (-2 - 2 * hurst)])
-    return surface | {"q": np.array([q0, start, q1]), "C": C}
+    power = -2 - 2 * hurst
+    if rolloff.ndim:
+        bands = (
+            spectrum.Band(q0, start, level, 0.0),
+            spectrum.Band(start, q1, level, power),
+        )
+        return surface | {"bands": bands}
+    C = float(level) * np.array([1.0, 1.0, float((q1 / start) ** power)])
+    return surface | {"q": np.array([float(q0), float(start), float(q1)]), "C": C}
 
 
 def _band(
@@ -314,74 +319,78 @@ def _band_with_rolloff(
     at: Mapping[str, FloatArray], h_rms: FloatArray, slope: str
 ) -> tuple[FloatArray, FloatArray]:
     """Smallest and largest wavenumber of a spectrum with a flat part and a given slope."""
-    if h_rms.ndim:
-        raise InputError(f"rolloff is of one surface, got shape {h_rms.shape}")
-    start = 2 * math.pi / float(at["rolloff"])
-    hurst = float(at["hurst"])
-    wanted = float(_slope_variance(at, h_rms, slope) / (h_rms * start) ** 2)
+    start = 2 * math.pi / at["rolloff"]
+    hurst = at["hurst"]
+    wanted = _slope_variance(at, h_rms, slope) / (h_rms * start) ** 2
 
     # the wavelength that is not given follows from the slope: it rises with q1, and falls
     # with the longest
     if "longest" in at:
-        longer = float(at["longest"]) * start / (2 * math.pi)
-        if longer < 1:
+        longer = at["longest"] * start / (2 * math.pi)
+        if (longer < 1).any():
             raise InputError(
                 "rolloff must be at most longest, from which on the spectrum is flat"
             )
 
-        def excess_at_zeta(log_zeta: float) -> float:
-            return _excess_of_slope(longer, math.exp(log_zeta), hurst, wanted)
+        def excess_at_zeta(log_zeta: Any, longer: Any, H: Any, goal: Any) -> Any:
+            return _excess_of_slope(longer, np.exp(log_zeta), H, goal)
 
         lowest = spectrum.MIN_ZETA_1 * (1 + 1e-9)
-        zeta = _root_for(slope, at[slope], excess_at_zeta, lowest)
-        return np.asarray(start / longer), np.asarray(start * zeta)
+        given = longer, hurst, wanted
+        zeta = _root_for(slope, at[slope], excess_at_zeta, lowest, given)
+        return start / longer, start * zeta
 
-    zeta = 2 * math.pi / float(at["shortest"]) / start
-    if zeta <= spectrum.MIN_ZETA_1:
+    zeta = 2 * math.pi / at["shortest"] / start
+    if (zeta <= spectrum.MIN_ZETA_1).any():
         raise InputError(
             "rolloff must be more than 3 times shortest, between which the spectrum falls"
         )
 
-    def excess_at_longest(log_longer: float) -> float:
-        return _excess_of_slope(math.exp(log_longer), zeta, hurst, wanted)
+    def excess_at_longest(log_longer: Any, zeta: Any, H: Any, goal: Any) -> Any:
+        return _excess_of_slope(np.exp(log_longer), zeta, H, goal)
 
-    longer = _root_for(slope, at[slope], excess_at_longest, 1 + 1e-9)
-    return np.asarray(start / longer), np.asarray(start * zeta)
+    given = zeta, hurst, wanted
+    longer = _root_for(slope, at[slope], excess_at_longest, 1 + 1e-9, given)
+    return start / longer, start * zeta
 
 
-def _excess_of_slope(longer: float, zeta: float, hurst: float, wanted: float) -> float:
+def _excess_of_slope(longer: Any, zeta: Any, hurst: Any, wanted: Any) -> FloatArray:
     """ln of m2/(m0 start^2) over the wanted one, for q0 = start/longer and q1 = zeta start.
 
     m0 = 2 pi C (flat_0 + law_0) and m2 = pi C (flat_2 + law_2), with the integrals of q dq
     and q^3 dq.
     """
-    flat_0 = (1 - longer**-2) / 2
-    flat_2 = (1 - longer**-4) / 4
-    law_0 = -math.expm1(-2 * hurst * math.log(zeta)) / (2 * hurst)
-    law_2 = math.log(zeta)
-    if hurst < 1:
-        law_2 = math.expm1((2 - 2 * hurst) * math.log(zeta)) / (2 - 2 * hurst)
-    return math.log((flat_2 + law_2) / (2 * (flat_0 + law_0)) / wanted)
+    flat_0 = (1 - longer**-2.0) / 2
+    flat_2 = (1 - longer**-4.0) / 4
+    log_zeta = np.log(zeta)
+    law_0 = log_zeta * spectrum.growth(-2 * hurst, log_zeta)
+    law_2 = log_zeta * spectrum.growth(2 - 2 * hurst, log_zeta)
+    return np.asarray(np.log((flat_2 + law_2) / (2 * (flat_0 + law_0)) / wanted))
 
 
 def _root_for(
-    slope: str, number: FloatArray, excess: Callable[[float], float], lowest: float
-) -> float:
-    """The ratio of wavenumbers, above the lowest, at which a spectrum has the slope."""
-    from scipy.optimize import brentq
+    slope: str,
+    number: FloatArray,
+    excess: Callable[..., FloatArray],
+    lowest: float,
+    given: tuple[FloatArray, ...],
+) -> FloatArray:
+    """The ratios of wavenumbers, above the lowest, at which spectra have the slope."""
+    from scipy.optimize.elementwise import find_root
 
-    low = math.log(lowest)
-    high = math.log(spectrum.MAX_ZETA_1)
+    ends = math.log(lowest), math.log(spectrum.MAX_ZETA_1)
     # slopes at both ends over the stated one, of Rsm the inverse
-    ratios = sorted(math.exp(excess(end) / 2) for end in (low, high))
-    stated = float(number)
-    bounds = [stated * ratio for ratio in ratios]
-    if slope == "Rsm":
-        bounds = [stated / ratio for ratio in reversed(ratios)]
-    least, most = bounds
-    allowed = f"between {least:.4g} and {most:.4g}, which spectra with this rolloff have"
-    require(slope, number, np.asarray(least < stated < most), allowed)
-    return math.exp(brentq(excess, low, high, xtol=1e-14, rtol=1e-14))
+    ratios = np.sort([np.exp(excess(end, *given) / 2) for end in ends], axis=0)
+    least, most = number * (1 / ratios[::-1] if slope == "Rsm" else ratios)
+    allowed = (
+        f"between {least.min():.4g} and {most.max():.4g}, which spectra with this rolloff "
+        "have"
+    )
+    require(slope, number, (least < number) & (number < most), allowed)
+    root = find_root(
+        excess, ends, args=given, tolerances={"xrtol": 1e-14, "xatol": 1e-14}
+    )
+    return np.asarray(np.exp(root.x))
 
 
 def areal_parameters(heights: ArrayLike, steps: tuple[float, float]) -> dict[str, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -21,7 +21,7 @@ from mbma_tables.common.arguments import (
     spread,
 )
 from mbma_tables.common.display import shown
-from mbma_tables.common.errors import InputError, OutOfRangeError
+from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.any_surface import AnySurface, apply, frozen, refuse_plain
@@ -271,7 +271,7 @@ class SelfAffine(AnySurface):
             profile's elements [length].
         longest, shortest : array_like, optional
             Wavelengths at which the roughness ends [length].
-        rolloff : float or str, optional
+        rolloff : array_like, optional
             Longest wavelength of the power law [length]; between `longest` and it the
             spectrum is flat, as for most machined faces. Default: `longest`.
         process : str, optional
@@ -284,7 +284,8 @@ class SelfAffine(AnySurface):
         Returns
         -------
         Surface
-            Self-affine; with a `rolloff` a `MeasuredSurface` with this spectrum.
+            Self-affine; with a `rolloff` a `MeasuredSurface` with this spectrum, for arrays
+            a `BandedSurface`.
 
         Raises
         ------
@@ -310,6 +311,8 @@ class SelfAffine(AnySurface):
             if name not in ("cls", "unit", "process")
         }
         numbers = surface_of_roughness(unit, roughness_parameters, process)
+        if "bands" in numbers:
+            return cls.banded(**numbers)
         return cls.spectral(**numbers) if "C" in numbers else cls(**numbers)
 
     @classmethod
@@ -377,10 +380,7 @@ class SelfAffine(AnySurface):
         return type(self)(*numbers, unit=self.unit, provenance=records)
 
     def power_law_with(self, other: AnySurface) -> Any:
-        """The sum with a surface in the same unit where it is one power law; None where it is not.
-
-        A batch is such a sum in every entry, or refused.
-        """
+        """The sum with a surface in the same unit where it is one power law, in every entry; else None."""
         if not isinstance(other, SelfAffine) or self.resolution or other.resolution:
             return None
         numbers = [getattr(self, name) for name in PARAMETERS]
@@ -390,11 +390,13 @@ class SelfAffine(AnySurface):
                 f"{name} of {which}" for which in ("one", "other") for name in PARAMETERS
             ]
             refuse_plain(dict(zip(names, numbers, strict=True)))
+            if not _same_labelled_band(numbers):
+                return None
             h_rms, h_max = apply(_added, tuple(numbers), outputs=2)
-        elif self.shape == other.shape == () and not _same_band(*numbers):
-            return None
         else:
             broadcast_shape(one=self.h_rms, other=other.h_rms)
+            if not _same_band(*numbers).all():
+                return None
             h_rms, h_max = _added(*numbers)
         record = {
             "step": "combined",
@@ -404,6 +406,11 @@ class SelfAffine(AnySurface):
         return type(self)(
             **band, h_rms=h_rms, h_max=h_max, unit=self.unit, provenance=(record,)
         )
+
+    def bands_if_few(self) -> tuple[spectrum.Band, ...]:
+        """Its power law."""
+        C = self.hurst / math.pi * (self.s / self.q0) ** 2
+        return (spectrum.Band(self.q0, self.q1, C, -2 - 2 * self.hurst),)
 
     def power_spectrum(self, q: ArrayLike) -> Any:
         """C(q) of Eq. (6) [length^4], zero outside [q0, q1]; a batch broadcasts against q."""
@@ -423,21 +430,29 @@ def _same_band(*numbers: Any) -> NDArray[np.bool_]:
     return np.asarray(np.logical_and.reduce(np.broadcast_arrays(*alike)), dtype=bool)
 
 
+def _same_labelled_band(numbers: Sequence[Any]) -> bool:
+    """Whether the bands of DataArrays are the same; lazy ones count as different unless they are one object."""
+    import xarray as xr
+
+    count = len(PARAMETERS)
+    for one, other in zip(
+        numbers[: len(BAND)], numbers[count : count + len(BAND)], strict=True
+    ):
+        if one is other:
+            continue
+        if any(getattr(each, "chunks", None) for each in (one, other)):
+            return False
+        pair = xr.broadcast(xr.DataArray(one), xr.DataArray(other))
+        if not np.isclose(*pair, rtol=SAME, atol=0.0).all():
+            return False
+    return True
+
+
 def _added(*numbers: Any) -> tuple[Any, Any]:
-    """h_rms and h_max of the sums of two surfaces, each by its `PARAMETERS`.
+    """h_rms and h_max of the sums of two surfaces of one band, each by its `PARAMETERS`.
 
     Variances add, and of Gaussian heights the squares of the highest points.
     """
-    same = _same_band(*numbers)
-    if not same.all():
-        places = ", ".join(
-            str(tuple(place)) for place in np.argwhere(~same)[:SHOWN].tolist()
-        )
-        raise OutOfRangeError(
-            f"two surfaces of a batch have different q0, q1 or hurst, at {places}: the sum of "
-            "their spectra is no power law, and known of one surface at a time",
-            ~same,
-        )
     heights, tops = numbers[3::5], numbers[4::5]
     return np.hypot(*heights), np.hypot(*tops)
 

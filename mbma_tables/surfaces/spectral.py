@@ -18,7 +18,7 @@ from mbma_tables.common.units import Units
 from mbma_tables.surfaces.any_surface import AnySurface, frozen
 from mbma_tables.surfaces.bearing_curve import Bearing, RadialSpectrum
 from mbma_tables.surfaces.heights import Heights, of_area
-from mbma_tables.surfaces.spectrum import MIN_ZETA_1, PowerLaws
+from mbma_tables.surfaces.spectrum import MIN_ZETA_1, Band, PowerLaws
 from mbma_tables.surfaces.treatment import Treated
 
 if TYPE_CHECKING:
@@ -59,6 +59,8 @@ NO_POWER = 1e-3  # share of the squared gradient beyond the last wavelengths tha
 # instrument, is 1e-13 or 1e-7
 ROUNDED = 1e-6
 SIDE = 1e-12  # beside a wavenumber, relative
+# power laws up to which a spectrum is one of numbers, not of a measurement
+FEW_BANDS = 4
 NO_MAP: dict[str, Any] = {
     "bearing": None,
     "bands": None,
@@ -323,6 +325,14 @@ class SpectralSurface(AnySurface):
     def sampled(self) -> Self:
         """Itself."""
         return self
+
+    def bands_if_few(self) -> tuple[Band, ...]:
+        """The power laws between its samples, where these are few and its heights Gaussian."""
+        laws = self.laws
+        if laws.width.size > FEW_BANDS or not self.heights.is_gaussian:
+            return ()
+        numbers = np.exp(laws.log_low), np.exp(laws.log_high), laws.low, laws.slope
+        return tuple(map(Band, *(each.tolist() for each in numbers)))
 
     def scaled(self, factor: float, unit: str | None) -> Self:
         """The same surface in another length unit; `factor` is the old unit in the new one."""

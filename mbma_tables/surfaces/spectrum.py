@@ -8,7 +8,7 @@ log(za) and log(zb/za), and a place between samples by its `Place`.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -138,6 +138,15 @@ def _log_zeta_of_alpha(hurst: FloatArray, alpha: FloatArray) -> FloatArray:
         low = np.where(is_wider, middle, low)
         high = np.where(is_wider, high, middle)
     return middle
+
+
+class Band(NamedTuple):
+    """A power law of a spectrum: C (q/q_low)^power from q_low to q_high; numbers or arrays."""
+
+    q_low: Any
+    q_high: Any
+    C: Any  # [length^4] as h_rms^2 = 2 pi integral C q dq
+    power: Any
 
 
 class Place(NamedTuple):

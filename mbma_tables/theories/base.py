@@ -132,6 +132,7 @@ class Theory(abc.ABC):
     looks = LOOKS  # initial gaps of an inversion, for one surface
     reached = 0.0  # relative amount by which a wanted value may exceed the largest
     bends_in_area = False  # whether at its `bends` only the area is not smooth
+    takes_batches_of_spectra = True  # such as those of parts with a roll-off
     # whether force vanishes at u = h_max; else its Gaussian heights are unbounded
     ends_at_h_max = True
     # whether it goes by the heights of a map, where a surface has them, and not by a spectrum
@@ -485,8 +486,8 @@ def select(surface: AnySurface, shape: tuple[int, ...], place: Indices) -> AnySu
         return surface
     chosen = np.asarray(place).astype(np.intp)
     numbers = [
-        np.broadcast_to(getattr(surface, name), shape).ravel()[chosen]
-        for name in surface.parameters
+        np.broadcast_to(number, shape).ravel()[chosen]
+        for number in surface.numbers().values()
     ]
     return surface.with_numbers(*numbers).taken_from(surface, shape, chosen)
 

@@ -10,6 +10,7 @@ from mbma_tables.common.arguments import FloatArray, finite_array, grouped, requ
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.banded import BandedSurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories.base import Theory, TheoryAnswer
 from mbma_tables.theories.calibrated.formulas import (
@@ -20,6 +21,7 @@ from mbma_tables.theories.calibrated.formulas import (
     self_affine_law,
     spectrum_of,
 )
+from mbma_tables.theories.calibrated.spectra import Spectra, laws_of
 
 Method = Literal["full", "simplified"]
 
@@ -32,6 +34,23 @@ INVERSE_RTOL = 1e-10  # error of a load found from its separation
 def _own_law(surface: MeasuredSurface) -> Law:
     """Persson's theory for a surface's own spectrum, with Yang and Persson's weight."""
     return Law(spectrum_of(surface), None, YANG_PERSSON)
+
+
+def _by_bands(surface: BandedSurface, quantity: str, given: FloatArray) -> FloatArray:
+    """Rows of a quantity of `Law` of a batch of spectra."""
+    number = np.arange(math.prod(surface.shape)).reshape(surface.shape)
+    columns = (
+        np.ascontiguousarray(np.broadcast_to(number, given.shape)).ravel(),
+        np.ascontiguousarray(given, float).ravel(),
+    )
+    endless = np.full(number.size, np.inf)
+    spectra = Spectra(laws_of(surface), np.ones(number.size), endless, YANG_PERSSON)
+    found = (
+        spectra.contacts(columns)
+        if quantity == "contact"
+        else spectra.separations(columns)
+    )
+    return found.reshape(-1, *given.shape)
 
 
 class _Light:
@@ -98,11 +117,13 @@ class Persson(Theory):
         self, surface: AnySurface, quantity: str, given: FloatArray
     ) -> FloatArray:
         """Rows of what a method of each distinct law answers to its entries, in their places."""
-        if isinstance(surface, MeasuredSurface):
+        if isinstance(surface, MeasuredSurface | BandedSurface):
             if self.method == "simplified":
                 raise InputError(
                     "the simplified form (20) needs self-affine surfaces: method='full', or surface.fit()"
                 )
+            if isinstance(surface, BandedSurface):
+                return _by_bands(surface, quantity, given)
             return np.asarray(getattr(_own_law(surface), quantity)(given))
         assert isinstance(surface, Surface)
         pairs = np.stack([np.ravel(surface.hurst), np.ravel(surface.zeta_1)])
@@ -151,7 +172,9 @@ class Persson(Theory):
         pressure = pressure * gradient
         error = np.full(
             pressure.shape,
-            LAW_ERROR if isinstance(surface, MeasuredSurface) else INVERSE_RTOL,
+            LAW_ERROR
+            if isinstance(surface, MeasuredSurface | BandedSurface)
+            else INVERSE_RTOL,
         )
         return TheoryAnswer(
             pressure, self.area_at(surface, pressure), stiffness * gradient / h_rms, error
@@ -204,6 +227,8 @@ class Persson(Theory):
         return area(pressure / np.asarray(surface.rms_gradient), 1.0, YANG_PERSSON)
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
+        if isinstance(surface, BandedSurface):
+            return super().energy(surface, mean_separation)
         gradient = np.asarray(surface.rms_gradient)
         load = self.answer(surface, mean_separation).pressure / gradient
         return np.asarray(

@@ -16,6 +16,7 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import shipped_file
 from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.banded import BandedSurface
 from mbma_tables.surfaces.surface import MeasuredSurface
 
 # longest wavelengths along a side of the nominal area from which surfaces of one spectrum differ by
@@ -118,7 +119,7 @@ def is_compared(surface: AnySurface) -> FloatArray:
     ranges = elastic_ranges()
     ratio = bandwidth(surface)
     broad = above(ratio, (0.0, BROADEST))
-    if isinstance(surface, MeasuredSurface):
+    if isinstance(surface, MeasuredSurface | BandedSurface):
         return np.asarray(~broad)
     low_hurst = below(getattr(surface, "hurst", 1.0), ranges["hurst"])
     return np.asarray(~(broad | below(ratio, ranges["bandwidth"]) | low_hurst))
@@ -126,7 +127,7 @@ def is_compared(surface: AnySurface) -> FloatArray:
 
 def bandwidth(surface: AnySurface) -> Any:
     """Longest over shortest wavelength; of a spectrum from where on a band holds most height."""
-    if isinstance(surface, MeasuredSurface):
+    if isinstance(surface, MeasuredSurface | BandedSurface):
         return np.asarray(surface.q1 / surface.longest)
     return np.asarray(surface.zeta_1)
 
@@ -141,15 +142,14 @@ def _has_low_hurst(surface: AnySurface, limits: Range) -> Any:
     if hurst is not None:
         return below(hurst, limits)
     ratio = bandwidth(surface)
-    if not ratio > 1:
-        return np.asarray(False)
     least = 2 * limits[0]
     # Eqs. (6) and (7) of a power law between 1/ratio and 1, in units of q1
-    squared_gradient = (1 - ratio ** (least - 2)) / (2 - least)
-    squared_height = (ratio**least - 1) / least
+    wide = np.maximum(ratio, 1 + 1e-9)
+    squared_gradient = (1 - wide ** (least - 2)) / (2 - least)
+    squared_height = (wide**least - 1) / least
     steepest = np.sqrt(squared_gradient / squared_height)
     steepness = surface.rms_gradient / (surface.h_rms * surface.q1)
-    return above(steepness, (0.0, steepest))
+    return (ratio > 1) & (np.asarray(steepness) > steepest * (1 + ROUNDING))
 
 
 def _of_the_surface(surface: AnySurface, by_heights: bool) -> dict[str, Any]:

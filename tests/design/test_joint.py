@@ -741,10 +741,6 @@ def test_metals_whose_names_begin_with_a_digit(typed, name):
             },
             r"do not broadcast: .*E_star \(3,\).*temperature \(2,\)",
         ),
-        (
-            {"part_b": FACE | {"hurst": [0.7, 0.8]}},
-            r"different q0, q1 or hurst, at \(0,\)",
-        ),
         ({"part_b": FACE | {"Rq": ["1 um", "-1 um"]}}, r"part_b: Rq.*got -1 at \(1,\)"),
         ({"part_b": FACE | {"Rq": ["1 um", 2.0]}}, "Rq: 2.0 has no unit beside others"),
         ({"part_b": FACE | {"hurst": []}}, "part_b: hurst is empty"),

@@ -124,9 +124,7 @@ def _one_surface(surface: AnySurface) -> AnySurface:
     """A surface of plain numbers; a batch is refused."""
     one = surface
     if one.labelled:
-        one = one.with_numbers(
-            *(np.asarray(getattr(one, name)) for name in one.parameters)
-        )
+        one = one.with_numbers(*map(np.asarray, one.numbers().values()))
     if one.shape != ():
         raise InputError(f"a law needs one surface, got a batch of shape {one.shape}")
     return one

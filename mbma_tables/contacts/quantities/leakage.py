@@ -13,6 +13,7 @@ from mbma_tables.common.arguments import (
     FloatArray,
     Numbers,
     finite_array,
+    grouped,
     is_labelled,
     positive_array,
     rows,
@@ -34,6 +35,7 @@ from mbma_tables.contacts.quantities.state import State
 from mbma_tables.contacts.quantities.validity import reasons_with_masks, valid_where_none
 from mbma_tables.core import core
 from mbma_tables.surfaces.any_surface import agree
+from mbma_tables.surfaces.banded import BandedSurface
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.base import Theory
 from mbma_tables.theories.calibrated.formulas import (
@@ -461,6 +463,19 @@ def flow_of_spectrum(spectrum: Spectrum, u: FloatArray, area: FloatArray) -> Flo
     return _flow(own_factor(spectrum), np.zeros(u.size, np.int64), u, area)
 
 
+def _flow_of_bands(
+    surface: BandedSurface, u: FloatArray, area: FloatArray, shape: tuple[int, ...]
+) -> FloatArray:
+    """The same of a batch of spectra, one by one."""
+    number = np.arange(math.prod(surface.shape)).reshape(surface.shape)
+    owner = np.broadcast_to(number, shape).ravel()
+    out = np.empty(u.size)
+    for row, mine in grouped(owner):
+        one = surface.entry(tuple(map(int, np.unravel_index(row, surface.shape))))
+        out[mine] = flow_of_spectrum(spectrum_of(one), u[mine], area[mine])
+    return out
+
+
 def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatArray:
     """K/h_rms^3 of mean separations u [length] and A/A0; 0 where blocked."""
     (u, contact), shape = rows(
@@ -468,6 +483,8 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
     )
     if isinstance(surface, MeasuredSurface):
         return flow_of_spectrum(spectrum_of(surface), u, contact).reshape(shape)
+    if isinstance(surface, BandedSurface):
+        return _flow_of_bands(surface, u, contact, shape).reshape(shape)
     table = shipped_flow()
     given = np.stack([np.ravel(surface.hurst), np.log(np.ravel(surface.zeta_1))])
     number = np.arange(given.shape[1]).reshape(surface.shape)

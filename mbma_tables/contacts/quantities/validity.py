@@ -40,7 +40,7 @@ def reasons_with_masks(
     if any_labelled(surface, *fields):
         import xarray as xr
 
-        numbers_of_surface = [getattr(surface, name) for name in surface.parameters]
+        numbers_of_surface = list(surface.numbers().values())
         arrays = xr.broadcast(*map(xr.DataArray, [*fields, *numbers_of_surface]))
         plain = [np.asarray(array) for array in arrays]
         fields = plain[: len(fields)]

@@ -16,6 +16,7 @@ from mbma_tables.common.arguments import FloatArray, filled
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.shared import shared
 from mbma_tables.core import core
+from mbma_tables.surfaces.banded import BandedSurface
 from mbma_tables.theories.calibrated.formulas import (
     CONSTANTS,
     NARROWNESS,
@@ -30,8 +31,9 @@ FIRST = -11.0
 LAST = 3.1
 RATE = 16.0
 TERMS = 6
-# room for the wavenumbers of each part of a spectrum: most need no more than the first
-ROOM = 256, 512, 1024
+# surfaces whose wavenumbers are found in one call, in room that is more than enough
+TOGETHER = 64
+COUNT, FIRST_WORD, WORD_STEP = 0, 1, 3  # places of numbers, and rows of a wavenumber
 
 
 @shared()
@@ -95,25 +97,33 @@ class Spectra:
         h_max: FloatArray,
         constants: Constants = CONSTANTS,
     ) -> None:
-        self._columns = laws, alpha, h_max
-        self._constants = constants
-        count, parts, _ = laws.shape
-        numbers = np.empty(count * core.words_of_spectrum_numbers())
         inner = inner_integral(constants)
-        columns = [np.ascontiguousarray(each, float) for each in (alpha, h_max)]
         given = np.array(dataclasses.astuple(constants))
-        flat = np.ascontiguousarray(laws).ravel()
-        for most in ROOM:
-            waves = np.empty(count * 3 * most * parts)
-            failed = core.spectra_of(*columns, flat, given, *inner, waves, numbers)
-            if not failed:
-                break
-        if failed:
+        room = np.empty(TOGETHER * core.most_wave_words())
+        waves = []
+        numbers = np.empty((len(laws), core.words_of_spectrum_numbers()))
+        used = 0
+        for start in range(0, len(laws), TOGETHER):
+            some = slice(start, start + TOGETHER)
+            columns = [np.ascontiguousarray(each[some], float) for each in (alpha, h_max)]
+            flat = np.ascontiguousarray(laws[some], float).ravel()
+            own = numbers[some]
+            core.spectra_of(*columns, flat, given, *inner, room, own.ravel())
+            words = int(WORD_STEP * own[:, COUNT].sum())
+            waves.append(room[:words].copy())
+            own[:, FIRST_WORD] += used
+            used += words
+        failed = numbers[:, COUNT] == 0
+        if failed.any():
             raise ConvergenceError(
-                f"{failed} spectra have no quadrature of {most * parts} wavenumbers",
-                numbers.reshape(count, -1)[:, 0] == 0,
+                f"the spectra of {failed.sum()} surfaces have no quadrature", failed
             )
-        self._found = waves, numbers, constants.area_t0, *inner
+        self._found = (
+            np.concatenate(waves),
+            numbers.ravel(),
+            constants.area_t0,
+            *inner,
+        )
 
     def _answers(self, loop: Any, columns: Any, outputs: int) -> FloatArray:
         fill = functools.partial(loop, *self._found)
@@ -126,6 +136,12 @@ class Spectra:
     def separations(self, columns: tuple[Any, FloatArray]) -> FloatArray:
         """A row of u [h_rms] by owners and forces over A0 E* g, positive."""
         return self._answers(core.spectra_separation, columns, 1)
+
+
+def laws_of(surface: BandedSurface) -> FloatArray:
+    """`laws` of a batch of spectra."""
+    bands = [np.stack(np.broadcast_arrays(*band), axis=-1) for band in surface.bands]
+    return np.stack(bands, axis=-2).reshape(-1, len(bands), 4)
 
 
 def self_affine_laws(hurst: FloatArray, zeta_1: FloatArray) -> FloatArray:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import math
 import weakref
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from mbma_tables.common.arguments import FloatArray, require, spread
 from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.banded import BandedSurface
 from mbma_tables.surfaces.spectral import PRESSED
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories import tested
@@ -21,11 +23,16 @@ from mbma_tables.theories.base import Theory, TheoryAnswer, unfinished
 from mbma_tables.theories.calibrated import table as calibrated_table
 from mbma_tables.theories.calibrated.formulas import (
     KEPT,
+    LAW_ERROR,
     force_at_area,
     light_factor,
 )
 from mbma_tables.theories.calibrated.formulas import area as law_area
-from mbma_tables.theories.calibrated.spectra import Spectra, self_affine_laws
+from mbma_tables.theories.calibrated.spectra import (
+    Spectra,
+    laws_of,
+    self_affine_laws,
+)
 from mbma_tables.theories.evidence import NAME, shipped_checksum, shipped_deviations
 from mbma_tables.theories.inversion import Curve
 
@@ -68,32 +75,33 @@ def _error(stated: Any, nearer: float, share: FloatArray) -> FloatArray:
 class Batch:
     """Surfaces prepared for about so many entries: for the table, and by their spectra outside of it."""
 
-    def __init__(self, surface: Surface, entries: int) -> None:
-        names = ("hurst", "zeta_1", "h_max", "h_rms", "rms_gradient", "alpha")
-        hurst, zeta_1, h_max, h_rms, gradient, alpha = (
+    def __init__(self, surface: Surface | BandedSurface, entries: int) -> None:
+        names = ("h_max", "h_rms", "rms_gradient", "alpha")
+        h_max, h_rms, gradient, alpha = (
             np.asarray(getattr(surface, name), float).ravel() for name in names
         )
-        table, self.shape, self.h_rms, self.gradient = (
-            calibrated_table.shipped(),
-            surface.shape,
-            h_rms,
-            gradient,
-        )
+        self.shape, self.h_rms, self.gradient = surface.shape, h_rms, gradient
         self.rows = np.arange(h_rms.size)
-        columns = np.array([hurst, np.log(zeta_1), h_max / h_rms])
-        self.covered = table.covers(*columns[:2]) & (
-            columns[2] <= np.exp(table.covered[2, 1])
-        )
+        heights = h_max / h_rms
+        if isinstance(surface, BandedSurface):
+            self.covered = np.zeros(heights.size, bool)
+            laws = laws_of(surface)
+        else:
+            hurst = np.asarray(surface.hurst, float).ravel()
+            zeta_1 = np.asarray(surface.zeta_1, float).ravel()
+            table = calibrated_table.shipped()
+            columns = np.array([hurst, np.log(zeta_1), heights])
+            self.covered = table.covers(*columns[:2]) & (
+                heights <= np.exp(table.covered[2, 1])
+            )
+            self.contacts, self.separations = table.prepared(columns, entries)
         self.whole = bool(self.covered.all())
-        self.contacts, self.separations = table.prepared(columns, entries)
         if not self.whole:
             rows = np.flatnonzero(~self.covered)
+            if not isinstance(surface, BandedSurface):
+                laws = self_affine_laws(hurst[rows], zeta_1[rows])
             self.number = np.cumsum(~self.covered) - 1
-            self.spectra = Spectra(
-                self_affine_laws(hurst[rows], zeta_1[rows]),
-                alpha[rows],
-                columns[2, rows],
-            )
+            self.spectra = Spectra(laws, alpha[rows], heights[rows])
 
     def part(self, rows: NDArray[np.intp], shape: tuple[int, ...]) -> Batch:
         """Some of the surfaces, which share what was prepared for all."""
@@ -151,8 +159,9 @@ class Batch:
     ) -> Iterator[tuple[Any, Callable[..., FloatArray], Any]]:
         """Entries with their loop of the core and its owners: by the table, and outside of it."""
         covered = self.covered[owner]
-        some = np.flatnonzero(covered & asked)
-        yield some, self.contacts if at_gaps else self.separations, owner[some]
+        if self.covered.any():
+            some = np.flatnonzero(covered & asked)
+            yield some, self.contacts if at_gaps else self.separations, owner[some]
         if not self.whole:
             some = np.flatnonzero(~covered & asked)
             loop = self.spectra.contacts if at_gaps else self.spectra.separations
@@ -160,7 +169,7 @@ class Batch:
 
 
 @shared(KEPT)
-def _single(surface: Surface) -> Batch:
+def _single(surface: Surface | BandedSurface) -> Batch:
     return Batch(surface, MANY)
 
 
@@ -168,14 +177,15 @@ def _single(surface: Surface) -> Batch:
 _prepared: weakref.WeakKeyDictionary[AnySurface, Batch] = weakref.WeakKeyDictionary()
 
 
-def _bound(surface: Surface, value: FloatArray) -> Batch:
+def _bound(surface: AnySurface, value: FloatArray) -> Batch:
+    assert isinstance(surface, Surface | BandedSurface)
     if not surface.shape:
         return _single(surface)
     whole, rows = surface.origin
     batch = _prepared.get(whole)
     if batch is not None:
         return batch if rows is None else batch.part(rows, surface.shape)
-    batch = Batch(surface, max(np.size(value), surface.hurst.size))
+    batch = Batch(surface, max(np.size(value), math.prod(surface.shape)))
     if not batch.whole and rows is None:
         _prepared[surface] = batch
     return batch
@@ -235,7 +245,6 @@ class Calibrated(Theory):
             (pressure, area, stiffness), own_error = _own_law(surface).answer(gap)
             error = _error(own_error, 1.0, gap / np.asarray(surface.h_max))
             return TheoryAnswer(pressure, area, stiffness, error)
-        assert isinstance(surface, Surface)
         gap, h_rms, (start, rate) = (
             np.asarray(mean_separation, float),
             np.asarray(surface.h_rms),
@@ -247,6 +256,8 @@ class Calibrated(Theory):
         stated = calibrated_table.shipped().error * np.exp(
             rate * np.clip(x - start, 0, tested.elastic_ranges()["heights"][1] - start)
         )
+        if isinstance(surface, BandedSurface):
+            stated = np.broadcast_to(LAW_ERROR, x.shape)
         pressure, area, stiffness = found
         return TheoryAnswer(
             pressure,
@@ -258,7 +269,7 @@ class Calibrated(Theory):
     def curve(self, surface: AnySurface, quantity: str) -> Curve:
         if isinstance(surface, MeasuredSurface):
             return super().curve(surface, quantity)
-        batch = _bound(cast(Surface, surface), np.empty(0))
+        batch = _bound(surface, np.empty(0))
 
         def values(u: FloatArray) -> tuple[Any, Any, bool]:
             pressure, area, stiffness = batch.contact(u)
@@ -286,7 +297,6 @@ class Calibrated(Theory):
         """The same, also where u differs from h_max by rounding."""
         if isinstance(surface, MeasuredSurface):
             return _own_law(surface).mean_separation(quantity, wanted)
-        assert isinstance(surface, Surface)
         batch = _bound(surface, wanted)
         flat, owner, shape, own = batch.placed(wanted)
         if quantity == "area":

@@ -82,6 +82,7 @@ class Mbma(Theory):
     outside: str = "raise"
 
     name = "mbma"
+    takes_batches_of_spectra = False  # sums of islands are one surface at a time
     advice = "theory='calibrated' for stiffness or separation"
 
     def __post_init__(self) -> None:
