@@ -35,6 +35,7 @@ from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1, SHARES, Band, 
 # wavenumbers at which the longest waves are looked for, besides the ends of bands
 SCAN = 48
 MOST = 16  # bands that the core adds
+SAME = 1e-12  # relative difference of numbers that differ by rounding
 MOMENTS = ("m0", "m2", "m4")
 DERIVED = ("q0", "q1", *MOMENTS)
 
@@ -245,6 +246,20 @@ class BandedSurface(AnySurface):
     def m4(self) -> Any:
         """Variance of a profile's second derivative [1/length^2], Eq. (7)."""
         return self._moments["m4"]
+
+    @functools.cached_property
+    def power_laws(self) -> tuple[Any, Any, Any]:
+        """Hurst exponent and zeta_1 where all bands are one, as for faces alike, and whether they are."""
+        first = self.bands[0]
+        same = np.ones(self.shape, bool)
+        for band in self.bands[1:]:
+            for one, other in zip(first, band, strict=True):
+                if one is not first.C:
+                    same = same & np.isclose(one, other, rtol=SAME, atol=0.0)
+        hurst = np.broadcast_to(-1 - np.asarray(first.power) / 2, self.shape)
+        is_one = same & (hurst > 0) & (hurst <= 1)
+        usable = np.where(is_one, hurst, 0.5)
+        return usable, np.asarray(first.q_high / first.q_low), is_one
 
     @functools.cached_property
     def longest(self) -> Any:

@@ -24,7 +24,7 @@ ROWS = [
     "1,steel 1020,1.2,0.4,700 nm,0.5,10,4",
     "2,copper C11000 hard,1.1,0.3,0.4 um,0.5,20,4",
     '3,"[""steel 1020"", ""copper C11000 hard""]",1.2,0.4,0.7 um,0.5,10,5',
-    "4,steel 1020,1.3,0.5,0.7 um,0.4,10,4",  # bands differ: one joint at a time
+    "4,steel 1020,1.3,0.5,0.7 um,0.4,10,4",  # bands differ
 ]
 SINGLE = [
     ("steel 1020", "1.2 GPa", "0.4 um", "0.7 um", "0.5 mm", "10 MPa", "4 cm^2"),
@@ -88,7 +88,9 @@ def test_rows_have_the_quantities_of_single_joints(table, tmp_path):
             "total_conductance [W/(m^2 K)]": pressed.total_conductance,
             "total_conductance_scatter": pressed.total_conductance_scatter,
         }.items():
-            assert float(row[header]) == pytest.approx(float(value), rel=1e-9), header
+            # the spectrum of one joint of two bands is sampled, of a batch it is exact
+            rtol = 1e-9 if numbers is not SINGLE[3] else 1e-6
+            assert float(row[header]) == pytest.approx(float(value), rel=rtol), header
 
 
 def test_refused_rows_stay_with_their_reason(table, tmp_path):

@@ -72,6 +72,18 @@ def _error(stated: Any, nearer: float, share: FloatArray) -> FloatArray:
     return error
 
 
+def _power_laws(
+    surface: Surface | BandedSurface,
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Hurst exponents and zeta_1, flat, of surfaces that are self-affine, and which these are."""
+    if isinstance(surface, BandedSurface):
+        hurst, zeta_1, is_one = (np.ravel(each) for each in surface.power_laws)
+        return hurst, zeta_1, is_one.astype(bool)
+    numbers = surface.hurst, surface.zeta_1
+    hurst, zeta_1 = (np.asarray(each, float).ravel() for each in numbers)
+    return hurst, zeta_1, np.ones(hurst.size, bool)
+
+
 class Batch:
     """Surfaces prepared for about so many entries: for the table, and by their spectra outside of it."""
 
@@ -83,25 +95,25 @@ class Batch:
         self.shape, self.h_rms, self.gradient = surface.shape, h_rms, gradient
         self.rows = np.arange(h_rms.size)
         heights = h_max / h_rms
-        if isinstance(surface, BandedSurface):
-            self.covered = np.zeros(heights.size, bool)
-            laws = laws_of(surface)
-        else:
-            hurst = np.asarray(surface.hurst, float).ravel()
-            zeta_1 = np.asarray(surface.zeta_1, float).ravel()
-            table = calibrated_table.shipped()
-            columns = np.array([hurst, np.log(zeta_1), heights])
-            self.covered = table.covers(*columns[:2]) & (
-                heights <= np.exp(table.covered[2, 1])
-            )
-            self.contacts, self.separations = table.prepared(columns, entries)
+        table = calibrated_table.shipped()
+        hurst, zeta_1, is_self_affine = _power_laws(surface)
+        columns = np.array([hurst, np.log(zeta_1), heights])
+        self.covered = (
+            is_self_affine
+            & table.covers(*columns[:2])
+            & (heights <= np.exp(table.covered[2, 1]))
+        )
         self.whole = bool(self.covered.all())
+        self.contacts, self.separations = table.prepared(columns, entries)
         if not self.whole:
             rows = np.flatnonzero(~self.covered)
-            if not isinstance(surface, BandedSurface):
-                laws = self_affine_laws(hurst[rows], zeta_1[rows])
             self.number = np.cumsum(~self.covered) - 1
-            self.spectra = Spectra(laws, alpha[rows], heights[rows])
+            laws = (
+                laws_of(surface)
+                if isinstance(surface, BandedSurface)
+                else self_affine_laws(hurst, zeta_1)
+            )
+            self.spectra = Spectra(laws[rows], alpha[rows], heights[rows])
 
     def part(self, rows: NDArray[np.intp], shape: tuple[int, ...]) -> Batch:
         """Some of the surfaces, which share what was prepared for all."""
@@ -257,7 +269,8 @@ class Calibrated(Theory):
             rate * np.clip(x - start, 0, tested.elastic_ranges()["heights"][1] - start)
         )
         if isinstance(surface, BandedSurface):
-            stated = np.broadcast_to(LAW_ERROR, x.shape)
+            one_law = np.reshape(surface.power_laws[2], surface.shape)
+            stated = np.where(one_law, stated, LAW_ERROR)
         pressure, area, stiffness = found
         return TheoryAnswer(
             pressure,
