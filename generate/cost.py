@@ -84,6 +84,19 @@ LAW_RTOLS = RTOLS[1:]
 SLOW_LAW_RTOLS = (1e-2, 1e-4)
 THEORY_LAW_RTOLS = (1e-3, 1e-5, 1e-7)
 MANY = 20_000  # gaps, about as many as a law begins to pay for
+# scenes that have one effect more than pressures and areas; a mean pressure keeps the plan
+# of theories that have its slopes at once from a law
+EFFECTS = {
+    "base": ["area", "mean_pressure"],
+    "inverse": ["area", "mean_pressure"],
+    "slopes": ["area", "stiffness"],
+    "energy": ["area", "energy"],
+    "leakage": ["area", "leakage"],
+    "yield": ["area", "yield"],
+    "yield inverse": ["area", "yield"],
+}
+# gaps of those that take longer
+COUNTS = {"energy": 1000, "leakage": 1000}
 FIRST_USE = (
     "import mbma_tables, numpy, time; s = mbma_tables.Surface(0.74, 1.0, 330.0, 0.1, 0.3); "
     "t = time.process_time(); "
@@ -330,37 +343,68 @@ def law_rows() -> Iterator[Row]:
 
 
 def theory_rows() -> Iterator[Row]:
-    """Theories other than MBMA: a call, each further gap, energies, and laws.
-
-    Gaps by separation or by pressure.
-    """
+    """Theories other than MBMA: a call, each further gap, and laws."""
     surface = SURFACES[3]
     u = np.linspace(0.1, 0.9, MANY) * float(surface.h_max)
 
     def answer(theory: str, **arguments: Any) -> Any:
         return contact(fresh(surface), theory=theory, **arguments)
 
-    def energy_of(theory: str) -> Any:
-        return answer(theory, mean_separation=u).energy
-
     def law_of(theory: str, rtol: float) -> Any:
         return contact_law(fresh(surface), theory=theory, rtol=rtol)
 
     for name in theories.THEORIES[1:]:
-        pressure = answer(name, mean_separation=u).pressure
         one, _ = measure(functools.partial(answer, name, mean_separation=u[:1]))
         gaps, _ = measure(functools.partial(answer, name, mean_separation=u))
-        inverse, _ = measure(functools.partial(answer, name, pressure=pressure))
         # what a call takes besides its gaps: noise does not make it negative
         fixed = max((u.size * one - gaps) / (u.size - 1), 1e-3 * one)
-        energy, _ = measure(functools.partial(energy_of, name))
         yield Row(name, "call", "both", None, fixed)
-        costs = {"gap": gaps - fixed, "invert": inverse - fixed, "energy": energy - gaps}
-        for what, cost in costs.items():
-            yield Row(name, what, "both", None, max(cost, 1e-9) / u.size)
+        yield Row(name, "gap", "both", None, max(gaps - fixed, 1e-9) / u.size)
         for rtol in THEORY_LAW_RTOLS:
             cost, _ = measure(functools.partial(law_of, name, rtol))
             yield Row(name, at("law", rtol), "both", None, cost)
+
+
+def effect_rows() -> Iterator[Row]:
+    """What effects of scenes cost besides pressures and areas at given gaps: once, and for each gap."""
+    surface = SURFACES[3]
+    farthest = float(surface.h_max)
+
+    def run(theory: str, part: str, count: int) -> Any:
+        u = np.linspace(0.6, 0.95, count) * farthest
+        effects = EFFECTS[part]
+        if theory == "mbma" and part in ("base", "inverse"):
+            effects = ["pressure", "area"]
+        given: dict[str, Any] = {"mean_separations": u}
+        pressure = contact(surface, mean_separation=u, theory=theory).pressure
+        if "inverse" in part:
+            given = {"pressures": pressure}
+        if "yield" in part:
+            # asperities yield, and the bulk does not
+            at_most = float(surface.rms_gradient) / 2
+            given["hardness"] = max(at_most, 4 * float(np.max(pressure)))
+
+        def scene() -> Any:
+            made = Scene(
+                fresh(surface), effects=effects, theory=theory, rtol=1e-4, **given
+            )
+            return made.run()
+
+        return measure(scene)[0]
+
+    for theory in theories.THEORIES:
+        base = {
+            count: run(theory, "base", count) for count in (1, MANY, *COUNTS.values())
+        }
+        for part in EFFECTS:
+            if part == "base" or (part == "slopes" and theory != "mbma"):
+                continue
+            count = COUNTS.get(part, MANY)
+            one = run(theory, part, 1) - base[1]
+            many = run(theory, part, count) - base[count]
+            each = max((many - one) / (count - 1), 1e-9)
+            yield Row(theory, f"{part} once", "both", None, max(one - each, 1e-9))
+            yield Row(theory, f"{part} gap", "both", None, each)
 
 
 def first_use_rows() -> Iterator[Row]:
@@ -389,6 +433,7 @@ def study() -> bytes:
         gap_rows,
         law_rows,
         theory_rows,
+        effect_rows,
         first_use_rows,
     ):
         rows += part()

@@ -8,10 +8,11 @@ from generate import cost, cost_distances, distances
 from generate.boundary_elements.run import GRIDS
 from generate.files import ROOT, read_csv
 from generate.pages import cost as pages_cost
-from mbma_tables import contact
+from generate.timing import measure
+from mbma_tables import Scene, Surface, contact
 from mbma_tables.design.scenes.plan import read_costs, shipped_costs, shipped_distances
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.theories import Mbma
+from mbma_tables.theories import THEORIES, Mbma
 
 COST = 2.0
 SECONDS = 1e-3
@@ -83,18 +84,57 @@ def test_totals_laws_and_theories(monkeypatch):
     assert {row.what for row in rows.values()} == {
         "call",
         "gap",
-        "invert",
-        "energy",
         "law",
     }
     assert rows["persson", "law rtol=1e-05", "both"].cost == COST
+    monkeypatch.setattr(cost, "COUNTS", {"energy": 3})
+    rows = by_variant(cost.effect_rows())
+    assert {theory for theory, _, _ in rows} == {*THEORIES}
+    parts = {what.rpartition(" ")[0] for _, what, _ in rows}
+    assert parts == {*cost.EFFECTS} - {"base"}
+    # where every scene takes as long, no effect costs anything
+    assert max(row.cost for row in rows.values()) == 1e-9
+
+
+SURFACE = Surface(0.8, 0.0126, 0.8, 0.8, 3.2, unit="um")
+GAPS_OF_SCENES = {"separations": (0.2, 2.5), "pressures": (1e-4, 1e-2)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("theory", "count", "by", "effects"),
+    [
+        ("mbma", 1000, "pressures", ["area", "yield"]),
+        ("mbma", 1000, "separations", ["leakage"]),
+        ("mbma", 20_000, "pressures", ["area", "stiffness"]),
+        ("calibrated", 20_000, "separations", ["area", "yield"]),
+        ("calibrated", 1000, "pressures", ["area", "yield"]),
+        ("calibrated", 1, "separations", ["energy"]),
+        ("persson", 20_000, "pressures", ["area", "yield"]),
+        ("greenwood_williamson", 20_000, "pressures", ["area", "yield"]),
+        ("greenwood_williamson", 1, "pressures", ["area", "stiffness"]),
+    ],
+)
+def test_a_scene_of_another_surface_costs_what_its_plan_says(theory, count, by, effects):
+    """Within 2, in units of the fixed work: one of many candidates, none of it cached."""
+    gaps = np.geomspace(*GAPS_OF_SCENES[by], count)
+    hardness = {"hardness": "2 GPa"} if "yield" in effects else {}
+
+    def scene():
+        surface = cost.fresh(SURFACE)
+        given = {by: gaps, "E_star": "100 GPa", "theory": theory, "rtol": 1e-4}
+        return Scene(surface, effects, **given, **hardness)
+
+    planned = scene().plan().seconds / shipped_costs().seconds
+    measured, _ = measure(lambda: scene().run())
+    assert 0.5 < measured / planned < 2
 
 
 def test_a_study_becomes_data(tmp_path, monkeypatch):
     shipped = shipped_costs()
-    seconds = iter([3.0, shipped_costs().seconds, *[2.0] * 5])
+    seconds = iter([3.0, shipped_costs().seconds, *[2.0] * 6])
     own = [row for row in shipped.rows if row.island_model != "unit"]
-    for name in ("island", "scene", "gap", "law", "theory", "first_use"):
+    for name in ("island", "scene", "gap", "law", "theory", "effect", "first_use"):
         monkeypatch.setattr(
             cost, f"{name}_rows", lambda name=name: own if name == "island" else []
         )

@@ -45,11 +45,6 @@ AMPLIFICATION = {
 MIN_ENERGY_RTOL = 2e-9  # of an integral to 1e-9
 MIN_LAW_GAPS = 150  # from which a law pays where costs were not measured
 MIN_LAW_RTOL = 1e-9
-# of MBMA, over the fixed piece of work: once and for each gap, besides the totals
-OF_MBMA = {"inverse": (2.1, 3e-3), "slopes": (0.3, 5e-4), "energy": (7.0, 0.28)}
-# over an elastic call, and over one of many elastic gaps (docs/yield.md)
-YIELDING_CALL = 2.2
-YIELDING_GAP = 2.6
 LAST = 0.95  # largest share of h_max at which the error of a theory is looked up
 # tolerances of which a time budget allows the first that it can
 LADDER = (1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
@@ -409,6 +404,7 @@ class _Planner:
             "slopes": self.problem.needs_slopes,
             "energy": self.problem.computes("energy"),
             "yield": "yield" in outputs,
+            "leakage": "leakage" in outputs,
         }
         parts = frozenset(part for part, is_needed in requirements.items() if is_needed)
         reasons = ", ".join(why)
@@ -429,15 +425,22 @@ class _Planner:
         factor = math.prod(by for part, by in AMPLIFICATION.items() if part in parts)
         what = f"sum over islands (Eqs. 48, 49): {self.evaluation}"
         step = self.summed("contact", why, what, None, factor)
-        besides_totals = []
-        for part, (once, each) in OF_MBMA.items():
-            if part in parts:
-                besides_totals.append(self.costs.seconds * (once + each * self.count))
-        seconds = step.seconds + sum(besides_totals)
-        # the cost of yielding was not measured
-        if "yield" in parts:
-            seconds = math.nan
-        return dataclasses.replace(step, seconds=seconds, theory=self.problem.theory_name)
+        theory = self.problem.theory_name
+        seconds = step.seconds + self.besides(theory, parts)
+        return dataclasses.replace(step, seconds=seconds, theory=theory)
+
+    def besides(self, theory: str, parts: frozenset[str]) -> float:
+        """Seconds of what one contact computes besides pressures and areas at given gaps."""
+        # with a hardness the gap at a pressure is found otherwise
+        if {"inverse", "yield"} <= parts:
+            parts = parts - {"inverse", "yield"} | {"yield inverse"}
+        if "slopes" in parts and not self.problem.sums_islands:
+            parts -= {"slopes"}  # other theories have them at once
+        return sum(
+            self.costs.of(theory, f"{part} once")
+            + self.count * self.costs.of(theory, f"{part} gap")
+            for part in parts
+        )
 
     def contact_of_another(self, why: str, parts: frozenset[str]) -> Step:
         """One contact by a theory other than MBMA, or its law if that suffices and costs less."""
@@ -446,15 +449,10 @@ class _Planner:
         error = self.theory_error()
         if "yield" in parts:
             error = factor * error
-        call = self.costs.of(theory, "call")
-        each = self.costs.of(theory, "invert" if "inverse" in parts else "gap")
-        if "energy" in parts:
-            each += self.costs.of(theory, "energy")
-        if "yield" in parts:
-            call = YIELDING_CALL * call
-            seconds = call + YIELDING_GAP * self.count * each
-        else:
-            seconds = call + self.count * each
+        at_gaps = self.costs.of(theory, "call") + self.count * self.costs.of(
+            theory, "gap"
+        )
+        seconds = at_gaps + self.besides(theory, parts)
         step = Step(
             name="contact",
             why=why,
