@@ -21,7 +21,7 @@ ROAD = str(pathlib.Path(__file__).parents[2] / "examples" / "scene_road.toml")
 def test_plan_as_text_and_json():
     text = run("plan", JOINT)
     assert "-> contact by" in text
-    assert "left out: pressure, energy" in text
+    assert "left out: pressure, mean_pressure" in text
     content = json.loads(run("plan", JOINT, "--json"))
     assert [step["name"] for step in content["steps"]] == ["contact"]
 

@@ -12,7 +12,7 @@ from mbma_tables.common.files import shipped_file
 from mbma_tables.contacts.quantities.registry import registry
 from mbma_tables.design.scenes import problem
 from mbma_tables.design.scenes.plan import Row, read_costs, shipped_costs
-from mbma_tables.design.scenes.problem import OUTPUTS, REFINEMENTS
+from mbma_tables.design.scenes.problem import OTHERS, REFINEMENTS
 from mbma_tables.design.scenes.specimen import schema
 from mbma_tables.theories import THEORIES
 
@@ -138,10 +138,10 @@ def test_examples_are_scenes_and_the_schema_names_what_the_code_knows():
     assert all(text.startswith("Scene  (rtol=") for text in plans)
     tables = schema()["properties"]
     items = tables["effects"]["properties"]["on"]["items"]
-    assert set(items["enum"]) == {*OUTPUTS, *registry()}
+    assert set(items["enum"]) == {*OTHERS, *registry()}
     path = pathlib.Path(problem.__file__).with_name("scene.schema.json")
     published = json.loads(path.read_text())["properties"]["effects"]["properties"]["on"]
-    assert set(published["items"]["anyOf"][0]["enum"]) == set(OUTPUTS)
+    assert set(published["items"]["anyOf"][0]["enum"]) == set(OTHERS)
     assert tuple(tables["effects"]["properties"]["off"]["items"]["enum"]) == REFINEMENTS
     json.dumps(schema(), allow_nan=False)
 

@@ -22,9 +22,10 @@ from mbma_tables import (
     island,
     open_table,
 )
+from mbma_tables.contacts.quantities import registry
 from mbma_tables.design.scenes import plan as plans
 from mbma_tables.design.scenes import run as runs
-from mbma_tables.design.scenes.problem import ELASTIC, OF_CONTACT, OUTPUTS
+from mbma_tables.design.scenes.problem import ELASTIC, GROUPS, OTHERS
 from mbma_tables.islands.island_models import answer_islands
 from mbma_tables.islands.variants import REPORTED
 from mbma_tables.theories import GreenwoodWilliamson, Mbma, Persson
@@ -235,7 +236,11 @@ def test_a_plan_and_a_result_name_what_they_are_made_of():
         "-> contact by universal",
         "-> hertz area by universal",
     )
-    for part in (*steps, "left out: stiffness, energy", "switched off: subscale_area\n"):
+    for part in (
+        *steps,
+        "left out: mean_pressure, stiffness, energy",
+        "switched off: subscale_area\n",
+    ):
         assert part in text
     found = scene_of("pressure", rtol=1e-8, variant="printed").run()
     assert found.attrs["variant"] == "printed"
@@ -246,9 +251,11 @@ def test_a_plan_and_a_result_name_what_they_are_made_of():
     assert found["separation"].attrs["units"] == "mm"
 
 
+OF_CONTACT = ("pressure", "area", "stiffness", "energy", "solid_conductance", *GROUPS)
+TRIED = (*OF_CONTACT, *[name for name in OTHERS if name not in GROUPS])
 COMBINATIONS = [
     names
-    for names in [(name,) for name in OUTPUTS] + list(itertools.combinations(OUTPUTS, 2))
+    for names in [(name,) for name in TRIED] + list(itertools.combinations(TRIED, 2))
     if not ("yield" in names and set(names) & set(ELASTIC))
 ]
 
@@ -435,3 +442,20 @@ def test_no_contact():
         "island_delta",
     ):
         assert (found[name] == 0).all(), name
+
+
+def test_validity_and_yield_are_what_the_declarations_of_quantities_say():
+    """A quantity declared with an uncertainty of its own is in `validity` without any list of scenes."""
+    more = {"pressures": [0.05], "E_star": "13.3 MPa", "theory": "calibrated"}
+    asked = {"effects": ["solid_conductance", "validity", "yield"], "hardness": "0.2 MPa"}
+    given = more | asked | {"conductivities": ("2 W/(m K)", "2 W/(m K)")}
+    found = Scene(CONCRETE, **given).run()
+    uncertainties = {each.uncertainty for each in registry.registry().values()}
+    of_gas = {"gas_conductance_scatter", "total_conductance_scatter", "leakage_scatter"}
+    assert uncertainties - {None} - of_gas <= set(found.variables)
+    yielded = {
+        name
+        for name, declared in registry.registry().items()
+        if declared.is_listed is registry.of_yielding_contacts
+    }
+    assert {"yielded", "plane_separation", "psi"} <= yielded <= set(found.variables)

@@ -22,10 +22,10 @@ import numpy as np
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.design.scenes.problem import (
-    OUTPUTS,
     REFINEMENTS,
     Problem,
     of_contact,
+    usual_effects,
 )
 from mbma_tables.islands.island_models import AnyModel
 from mbma_tables.tables.island4d import Island4dModel
@@ -319,7 +319,7 @@ class _Planner:
         imports = [self.costs.of(island_model, "import") for island_model in shipped]
         return Plan(
             steps=tuple(steps),
-            left_out=tuple(name for name in OUTPUTS if name not in problem.outputs),
+            left_out=tuple(n for n in usual_effects() if n not in problem.outputs),
             switched_off=tuple(name for name in REFINEMENTS if name in problem.dropped),
             rtol=self.rtol,
             overhead=self.costs.of("scene", "call"),

@@ -19,7 +19,7 @@ from mbma_tables.common.arguments import (
 )
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, modulus_and_units, require_surface
-from mbma_tables.contacts.quantities.registry import registry
+from mbma_tables.contacts.quantities.registry import of_all_contacts, registry
 from mbma_tables.contacts.question import Question, name_of_the_given
 from mbma_tables.islands.island_models import ISLAND_MODELS, AnyModel
 from mbma_tables.islands.variants import Variant, get_variant
@@ -30,21 +30,12 @@ from mbma_tables.theories import OF_MAPS, THEORIES, default_name, options_of, re
 from mbma_tables.theories.base import Theory
 from mbma_tables.theories.mbma.models import with_table
 
-# effects, described in docs/scenes.md: those that are read from one contact, and others; any
-# further quantity of the registry is an effect of its name
-OF_CONTACT = (
-    "pressure",
-    "area",
-    "stiffness",
-    "energy",
-    "solid_conductance",
-    "leakage",
-    "validity",
-    "yield",
-)
+# effects, described in docs/scenes.md, beside the quantities of the registry, each of which
+# is an effect of its name: several quantities of a contact under one name, and others
+GROUPS = ("leakage", "validity", "yield")
 OF_ISLANDS = ("island_statistics", "pressure_profile")  # available for MBMA only
 OF_SUMS = "island_model"  # option of theories that sum islands
-OUTPUTS = (*OF_CONTACT[:6], *OF_ISLANDS, "comparison", *OF_CONTACT[6:])
+OTHERS = (*GROUPS, *OF_ISLANDS, "comparison")
 # part of the model, and on unless switched off
 REFINEMENTS = ("subscale_area", "sphere_deformation", "finite_height")
 ELASTIC = ("energy", *OF_ISLANDS)  # for contacts without yielding
@@ -69,13 +60,26 @@ NEEDS = {  # what an effect needs and no other uses
 
 
 def effects() -> dict[str, None]:
-    """Names of all effects: `OUTPUTS`, and every other quantity of the registry."""
-    return dict.fromkeys((*OUTPUTS, *registry()))
+    """Names of all effects: every quantity of the registry, and `OTHERS`."""
+    return dict.fromkeys((*registry(), *OTHERS))
+
+
+def usual_effects() -> list[str]:
+    """Effects that texts list: `OTHERS`, and what any contact of a scene has with a model uncertainty."""
+    names = []
+    for name, declared in registry().items():
+        # gaps are there without being asked for
+        is_usual = declared.uncertainty is not None and name != "mean_separation"
+        is_usual &= declared.is_listed is of_all_contacts
+        # what only a joint is given, no scene has
+        if is_usual and (not declared.needs or name in (*NEEDS, *ELASTIC)):
+            names.append(name)
+    return [*names, *OTHERS]
 
 
 def of_contact(outputs: Iterable[str]) -> list[str]:
     """Effects among `outputs` that are read from one contact."""
-    names = dict.fromkeys((*OF_CONTACT, *registry()))
+    names = dict.fromkeys((*registry(), *GROUPS))
     return [name for name in names if name in outputs]
 
 
@@ -205,7 +209,7 @@ class Problem:
         outputs = frozenset(self.effects)
         dropped = frozenset(self.without)
         if not outputs:
-            listed = ", ".join(OUTPUTS)
+            listed = ", ".join(usual_effects())
             raise InputError(f"no effect is requested: on needs at least one of {listed}")
         if "yield" in outputs:
             # refinements are those of an elastic theory

@@ -20,7 +20,11 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.plots import Curve, theory_label
 from mbma_tables.common.progress import doing
-from mbma_tables.contacts.quantities.registry import registry, unit_of
+from mbma_tables.contacts.quantities.registry import (
+    of_yielding_contacts,
+    registry,
+    unit_of,
+)
 from mbma_tables.design.scenes.plan import AMPLIFICATION, TABLES, Plan, Step
 from mbma_tables.design.scenes.problem import Problem
 from mbma_tables.islands.island_models import RigidModel, answer_islands
@@ -37,16 +41,6 @@ if TYPE_CHECKING:
 
     from mbma_tables.contacts.result import Contact
     from mbma_tables.theories.mbma.profile import Shape
-
-VALIDITY = (
-    "valid",
-    "scatter",
-    "area_scatter",
-    "stiffness_scatter",
-    "unloading_stiffness_scatter",
-    "separation_scatter",
-)
-YIELDED = ("yielded", "mean_pressure", "plane_separation", "unloading_stiffness")
 
 
 @dataclasses.dataclass
@@ -118,9 +112,15 @@ def _keep_quantities(run: Run, pressed: Contact) -> None:
     if "area" in names and "subscale_area" in problem.dropped:
         names.remove("area")
     if "validity" in requested:
-        names += VALIDITY
+        names += _validity(pressed)
     if "yield" in requested:
-        names += YIELDED
+        # how near the pressure of the spots is to the hardness, and what elastic contacts lack
+        names.append("mean_pressure")
+        names += [
+            name
+            for name, declared in registry().items()
+            if declared.is_listed is of_yielding_contacts
+        ]
     # some are one number for all gaps
     shape = np.shape(pressed.mean_separation)
     run.keep({name: np.broadcast_to(pressed.quantity(name), shape) for name in names})
@@ -139,6 +139,13 @@ def _keep_quantities(run: Run, pressed: Contact) -> None:
         run.reasons = {}
         for reason, is_concerned in pressed.reasons.items():
             run.reasons[reason] = np.flatnonzero(is_concerned).tolist()
+
+
+def _validity(pressed: Contact) -> list[str]:
+    """Whether contacts are valid, and the model uncertainty of every quantity that they show."""
+    uncertainties = {declared.uncertainty for declared in registry().values()}
+    shown = [name for name in registry() if name in uncertainties]
+    return ["valid", *(n for n in shown if registry()[n].is_shown(pressed))]
 
 
 def _outside(step: Step) -> str:

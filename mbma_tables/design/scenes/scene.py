@@ -28,8 +28,8 @@ class Scene(Problem):
     surface : Surface
         One surface, not a batch.
     effects : sequence of str
-        Requested effects: names of `mbma_tables.design.scenes.problem.OUTPUTS`, and of any further
-        quantity of a contact.
+        Requested effects: names of quantities of a contact, and of
+        `mbma_tables.design.scenes.problem.OTHERS`.
     without : sequence of str
         Refinements of the model switched off: "subscale_area", "sphere_deformation",
         "finite_height".
