@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from mbma_tables.contacts.law.make import contact_law as contact_law
     from mbma_tables.contacts.quantities.interface import Gas as Gas
     from mbma_tables.contacts.result import Contact as Contact
+    from mbma_tables.design.functions import contact_function as contact_function
     from mbma_tables.design.joint import Joint as Joint
     from mbma_tables.design.scenes.scene import Scene as Scene
     from mbma_tables.design.sensitivity import sensitivity as sensitivity
@@ -51,6 +52,7 @@ _HOMES = {
     "ContactLaw": "mbma_tables.contacts.law.law",
     "Scene": "mbma_tables.design.scenes.scene",
     "contact": "mbma_tables.contacts.contact",
+    "contact_function": "mbma_tables.design.functions",
     "contact_law": "mbma_tables.contacts.law.make",
     "flow_factors": "mbma_tables.effects.film",
     "island": "mbma_tables.theories.mbma.island",

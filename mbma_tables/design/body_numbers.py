@@ -81,6 +81,25 @@ class BodyNumbers:
         )
         return moved, dataclasses.replace(self.interface, gas=other)
 
+    def moved(self, given: Mapping[str, Any]) -> BodyNumbers:
+        """Those of other numbers."""
+        numbers = {name: given[name] for name in self.numbers}
+        bodies, interface = self.of_columns(numbers)
+        moved = dataclasses.replace(
+            self, bodies=bodies, interface=interface, numbers=numbers
+        )
+        changed = [
+            name
+            for name in (*MODULI, *POISSONS_RATIOS, "nu")
+            if name in numbers and not np.array_equal(numbers[name], self.numbers[name])
+        ]
+        # arrays of these do not reach the ratio of stiffnesses
+        if not changed or np.ndim(numbers[changed[0]]):
+            return moved
+        value = float(numbers[changed[0]])
+        with_ratio = moved.with_ratio(bodies, changed[0], value)
+        return dataclasses.replace(moved, bodies=with_ratio)
+
     def with_ratio(self, bodies: BodiesInUnits, name: str, value: float) -> BodiesInUnits:
         """Bodies with another Young's modulus or Poisson's ratio, and the same effective modulus."""
         own = bodies.bodies

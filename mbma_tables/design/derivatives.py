@@ -154,6 +154,33 @@ class Described:
                 row[here] = found[name]
         return table
 
+    def is_batched(self, numbers: Sequence[str], quantities: Sequence[str]) -> bool:
+        """Whether contacts of arrays of these numbers are made at once."""
+        of_ratio = {*MODULI, *POISSONS_RATIOS, "nu"} & set(numbers)
+        if of_ratio and "nu" in needs_of(quantities):
+            return False
+        return self.unknowns.batches or not set(self.unknowns.numbers) & set(numbers)
+
+    def moved(self, numbers: Mapping[str, Any]) -> Described:
+        """What is described by other numbers, others as they are."""
+        moved = {**self.numbers, **numbers}
+        surface = self.surface
+        own = self.unknowns.numbers
+        if set(own) & set(numbers):
+            given = {name: moved[name] for name in own}
+            surface = self.unknowns.make(**given)
+        body_numbers = self.body_numbers.moved(moved)
+        unknowns = dataclasses.replace(
+            self.unknowns, numbers={name: moved[name] for name in own}
+        )
+        return dataclasses.replace(
+            self,
+            surface=surface,
+            unknowns=unknowns,
+            body_numbers=body_numbers,
+            numbers=moved,
+        )
+
     def depends(self, name: str, needs: set[str]) -> bool:
         """Whether quantities with these needs depend on a number."""
         own = name.rpartition(".")[2]

@@ -55,6 +55,7 @@ from mbma_tables.contacts.quantities.tangential import (
 from mbma_tables.contacts.result import Contact
 from mbma_tables.design.body_numbers import BodyNumbers
 from mbma_tables.design.derivatives import Described
+from mbma_tables.design.functions import ContactFunction
 from mbma_tables.design.sensitivity import Sensitivity, sensitivity_of
 from mbma_tables.design.uncertainty import (
     DRAWS,
@@ -619,6 +620,49 @@ class Joint(JointQuantities, Displayed):
         """
         self.require_known("a sensitivity")
         return sensitivity_of(self.described("pressure", pressure), quantities)
+
+    def function(
+        self,
+        quantities: str | Sequence[str],
+        numbers: Sequence[str],
+        pressure: float | str,
+    ) -> ContactFunction:
+        """Quantities at a pressure as a differentiable function of some numbers of the joint, for optimisers, JAX and PyTorch.
+
+        Parameters
+        ----------
+        quantities : str or sequence of str
+            Names of quantities.
+        numbers : sequence of str
+            Names of the numbers that the function takes, as `sensitivity` has them, such as
+            "part_a.Rq", "hardness", "pressure"; all others stay those of the joint.
+        pressure : float or str
+            F/A0, plain numbers in the unit of the modulus; where "pressure" is among the
+            numbers, that at which a search begins.
+
+        Returns
+        -------
+        ContactFunction
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            As `sensitivity`; for names that are unknown, and for batches.
+
+        Examples
+        --------
+        >>> from mbma_tables import Joint
+        >>> face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+        >>> joint = Joint(face, bodies="copper C11000 hard", nominal_area="4 cm^2", theory="calibrated")
+        >>> conductance = joint.function("total_conductance", ["part_a.Rq", "pressure"], "10 MPa")
+        >>> value, gradient = conductance.values_and_jacobian([0.4, 0.02])  # um, GPa
+        >>> f"{value:.3g} W/(m^2 K), {gradient[0]:.3g} more for each um"
+        '6.97e+05 W/(m^2 K), -1.53e+06 more for each um'
+        """
+        self.require_one("a function")
+        return ContactFunction.of(
+            self.described("pressure", pressure), quantities, numbers
+        )
 
     def described(self, by: str, value: Any) -> Described:
         """All numbers of the joint and the quantity at which it is asked for, for derivatives by each."""

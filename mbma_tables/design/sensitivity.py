@@ -218,13 +218,24 @@ def sensitivity(
     >>> found.derivatives["Rq"]["mean_separation"].shape
     (2, 3)
     """
-    in_units = Bodies.of(bodies).in_units(surface)
     candidates = {
         "separation": separation,
         "mean_separation": mean_separation,
         "pressure": pressure,
         "area": area,
     }
+    described = described_contact(surface, bodies, candidates, theory)
+    return sensitivity_of(described, quantities)
+
+
+def described_contact(
+    surface: AnySurface,
+    bodies: Any,
+    candidates: Mapping[str, Any],
+    theory: str | Theory | UserTheory | None,
+) -> Described:
+    """All numbers of contacts at the one candidate that is given."""
+    in_units = Bodies.of(bodies).in_units(surface)
     question = Question.of(in_units.units, candidates)
     chosen = resolve(theory, surface, question.name)
     described = Described.of(
@@ -235,12 +246,12 @@ def sensitivity(
         question.name,
         question.value,
     )
-    return sensitivity_of(described, quantities)
+    _require_plain(described.numbers)
+    return described
 
 
 def sensitivity_of(described: Described, quantities: Sequence[str] | None) -> Sensitivity:
     """Values and derivatives of what is described."""
-    _require_plain(described.numbers)
     pressed = described.contact()
     wanted = _names(pressed, quantities, described.unknowns, described.by)
     found = derivatives_of(described, wanted, pressed)
