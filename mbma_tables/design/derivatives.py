@@ -1,7 +1,7 @@
 """Derivatives of quantities of contacts by every number that they are described by.
 
-Values are smooth to rounding, so that differences over a ten-thousandth of a number have
-nine digits. They are taken at given gaps, where contacts cost least, and the chain rule
+Values are smooth to rounding, so that differences over 3e-5 of a number have nine
+digits. They are taken at given gaps, where contacts cost least, and the chain rule
 turns them into those at a given pressure or area P::
 
     dQ/dx at given P = dQ/dx at given gap - dQ/dgap (dP/dx)/(dP/dgap)
@@ -30,10 +30,9 @@ from mbma_tables.design.unknowns import Asked, OfOneMap, Unknowns
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import Theory
 
-STEP = 1e-4  # of a number, relative
+STEP = 3e-5  # of a number, relative
 FINER = 0.2  # of a step, where both sides are looked at
-BENT = 2e-3  # second difference over the step of a function that is looked at again
-LEVELS = 4  # finer steps that are tried
+LEVELS = 3  # finer steps that are tried
 SMOOTH = 1e-7  # relative difference of two orders of a smooth function
 SAME = 1e-3  # likewise of one side of a kink
 JUMP = 1e-9  # relative difference of the limits of both sides
@@ -74,7 +73,7 @@ RIGHT_WEIGHTS = difference_weights(BOTH_SIDES[3:])
 SIMPLER_WEIGHTS = difference_weights(BOTH_SIDES[3:5])
 LIMIT_WEIGHTS = np.array([3.0, -3.0, 1.0])  # of a parabola at 0, by its values at 1, 2, 3
 # offsets of polynomials through values that are not smooth to rounding
-WIDE = 30.0
+WIDE = 100.0
 MANY = (-6.0, -5.0, -4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 INNER = slice(3, 9)
 POWERS = np.vander(MANY, 5, increasing=True)
@@ -415,7 +414,7 @@ class _Differences:
         cubic = np.minimum(second**2 / first, second) / 6
         error = (np.where(second == 0, 0.0, cubic) + NOISE * size) / step
         table.errors[place, :, entry] = error.T
-        bent = (second > BENT * STEP * size).any(axis=0)
+        bent = (cubic > SMOOTH * np.maximum(first / 2, STEP * size)).any(axis=0)
         if bent.any():
             some = place[bent], entry[bent]
             self._look_again(table, part, some, step[bent] * FINER)
