@@ -2,6 +2,7 @@
 
 import ast
 import pathlib
+import tomllib
 
 import pytest
 
@@ -44,6 +45,32 @@ def test_an_exception_is_one_of_a_registry_that_needs_it(monkeypatch, registry):
     monkeypatch.setattr(import_circles, "REGISTRIES", others)
     circles = import_circles.circles(ROOT / registry.partition(".")[0])
     assert registry in [name for circle in circles for name in circle]
+
+
+def upward(graph):
+    """Imports of a room from one that is above it, by the contract of layers."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    layers = settings["tool"]["importlinter"]["contracts"][0]["layers"]
+    floors = {
+        room: floor
+        for floor, layer in enumerate(reversed(layers))
+        for room in layer.split(" : ")
+    }
+    for name, others in graph.items():
+        own = name.split(".")[1]
+        for other in others:
+            room = other.split(".")[1]
+            if floors[room] > floors[own]:
+                yield name, other
+
+
+def test_no_import_runs_upwards_also_where_a_string_hides_it():
+    graph, _ = import_circles.import_graph(ROOT / "mbma_tables")
+    assert len(graph) > 150
+    assert list(upward(graph)) == []
+    graph["mbma_tables.theories.base"].add("mbma_tables.contacts.contact")
+    planted = ("mbma_tables.theories.base", "mbma_tables.contacts.contact")
+    assert list(upward(graph)) == [planted]
 
 
 NAMES = {repr(name) for name in (*theories.THEORIES, *theories.OF_MAPS)}

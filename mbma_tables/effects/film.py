@@ -19,7 +19,6 @@ from mbma_tables.contacts.quantities.lay import LAY, OPEN, SHEAR, WIDEST_LAY, fa
 from mbma_tables.contacts.quantities.leakage import shipped_flow
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.treatment import mirrored
-from mbma_tables.theories import OF_MAPS
 from mbma_tables.theories.base import Theory
 from mbma_tables.theories.simulated.own_map import map_of
 from mbma_tables.theories.simulated.reynolds import flow_and_couette
@@ -188,7 +187,8 @@ def flow_factors(
     u = np.ravel(found.mean_separation)
     h_rms = float(surface.h_rms)
     # a surface opened from the table of its simulation has no map for gaps before contact
-    own = found.theory in OF_MAPS and getattr(surface, "map", None) is not None
+    of_one_map = found.elastic_theory.gaps() is not None
+    own = of_one_map and getattr(surface, "map", None) is not None
     low, high = RANGE
     require(
         "mean_separation",
