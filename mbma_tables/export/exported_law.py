@@ -431,6 +431,17 @@ def exported_law(
     )
 
 
+def with_conductivity(
+    E_star: Any, hardness: float | str, conductivity: float, unit: str | None
+) -> Bodies:
+    """The bodies of a modulus, with a conductivity."""
+    if isinstance(E_star, Bodies):
+        raise InputError("conductivity is that of the bodies: leave it out beside Bodies")
+    text = number(number_in("conductivity", conductivity, 1e-300, 1e300))
+    both = conductivity if unit is None else f"{text} {unit}"
+    return Bodies(E_star, hardness=hardness, conductivity=(both, both))
+
+
 def _known(length: str | None, stress: str | None) -> tuple[str, str]:
     """The units, neither of which may be missing."""
     if length is None:

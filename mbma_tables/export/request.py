@@ -182,11 +182,19 @@ def files_of(
         "quantity": options.quantity,
         "friction_pressure": options.friction_pressure,
     }
+    bodies: float | str | Bodies = subject.E_star
+    if "quantity" in program.takes and of_rows.pop("quantity") is not None:
+        shared["quantity"] = _names(options.quantity)
+        if subject.bodies is not None:
+            # those of the contact itself
+            del shared["hardness"]
+            bodies = subject.bodies
+            shared["interface"] = subject.interface
     _refuse(target, [key for key, value in of_rows.items() if value is not None])
     if options.direction is not None and not options.leakage:
         raise InputError("direction is of leakage: ask for leakage or leave it out")
     shared |= _of_code(subject, target, units, options.heat)
-    return Written(program.files(subject.surface, subject.E_star, **shared, **named), ())
+    return Written(program.files(subject.surface, bodies, **shared, **named), ())
 
 
 def _of_rows(
@@ -283,6 +291,14 @@ def _quantities(
         return ["leakage"] if leakage else [_usual(subject, program, options.heat)]
     if leakage:
         raise InputError("quantity and leakage are both given: give quantity='leakage'")
+    names = _names(quantity)
+    if len(names) > 1 and not program.several:
+        raise InputError(f"{program.name} has one quantity a file: give one of {names}")
+    return names
+
+
+def _names(quantity: Any) -> list[str]:
+    """Names of quantities, of which each is one."""
     names = [quantity] if isinstance(quantity, str) else quantity
     if not isinstance(names, Sequence) or not names:
         raise InputError(f"quantity must be a name or several, got {quantity!r}")
@@ -292,10 +308,6 @@ def _quantities(
         require_quantity(name)
     if len(set(names)) < len(names):
         raise InputError(f"quantity has the same name twice: {quantity!r}")
-    if len(names) > 1 and not program.several:
-        raise InputError(
-            f"{program.name} has one quantity a file: give one of {list(names)}"
-        )
     return list(names)
 
 
@@ -471,20 +483,8 @@ def _of_code(
         notes.append(
             f"the joint's friction, {subject.friction:g}, is left out: the faces slide freely"
         )
-    arguments: dict[str, Any] = {}
-    if (
-        subject.is_joint
-        and language
-        and not language.unloads
-        and not _is_infinite(subject.hardness)
-    ):
-        notes.append(
-            "without conductance and tangential stiffness, which follow the unloading stiffness of contact that "
-            "yields: c-law, fortran-law, javascript-law, modelica-law, an FMU and rows have them"
-        )
-    else:
-        arguments |= _stiffness_before_slip(subject, notes)
-        arguments |= _heat_of_code(subject, target, units, heat, notes)
+    arguments = _stiffness_before_slip(subject, notes)
+    arguments |= _heat_of_code(subject, target, units, heat, notes)
     return {**arguments, "notes": tuple(notes)}
 
 
@@ -528,7 +528,3 @@ def _heat_of_code(
     if subject.gas is None:
         return conductivity
     return conductivity | {"gas": GasInGaps(subject.gas, unit)}
-
-
-def _is_infinite(hardness: float | str) -> bool:
-    return not isinstance(hardness, str) and math.isinf(hardness)

@@ -2,7 +2,8 @@
 
 import re
 
-WORD = re.compile(r"\b[A-Za-z]\w*")
+# no fields of structures
+WORD = re.compile(r"(?<![\w.])[A-Za-z]\w*")
 # tags of a template, and its places with the names that they are parts of
 _OF_TEMPLATES = r"\{%.*?%\}|\w*\{\{.*?\}\}\w*"
 

@@ -20,7 +20,7 @@ LAW = frozenset(
     {"theory", "variant", "hardness", "conductivity", "conductivity_unit", "kappa"}
 )
 ROWS = LAW | {"rows", "rtol", "pressures", "leakage", "quantity", "peklenik", "direction"}
-CODE = LAW | {"name", "leakage", "direction"}
+CODE = LAW | {"name", "leakage", "direction", "quantity"}
 FRICTION = {"kappa", "friction", "friction_pressure"}
 # groups by the modules that declare them, in the order in which help lists them
 GROUPS = {

@@ -86,14 +86,24 @@ def page_file(name: str) -> bytes:
     return (_ROOT / "page" / name).read_bytes()
 
 
+def file(name: str) -> str:
+    """The text of a file, named from this folder on."""
+    return (_ROOT / name).read_text(encoding="utf-8")
+
+
 def template(name: str) -> str:
     """The text of a template of jinja, named from this folder on, without the end of its name."""
-    return (_ROOT / f"{name}.jinja").read_text(encoding="utf-8")
+    return file(f"{name}.jinja")
 
 
 def filled(name: str, /, **parts: Any) -> str:
     """A template with its places filled in; a place that nothing is given for is an error."""
-    return str(_templates().from_string(template(name)).render(parts))
+    return str(_templates().get_template(name).render(parts))
+
+
+def rendered(source: str, /, **parts: Any) -> str:
+    """The same of a template that is no file."""
+    return str(_templates().from_string(source).render(parts))
 
 
 @functools.cache
@@ -102,13 +112,16 @@ def _templates() -> Any:
     import jinja2
 
     # lines that are tags alone leave nothing behind
-    return jinja2.Environment(
+    templates = jinja2.Environment(
+        loader=jinja2.FunctionLoader(template),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
         autoescape=False,  # code, not a page
     )
+    templates.tests["finite"] = math.isfinite
+    return templates
 
 
 def written_by(words: Iterable[str], command: str = "export") -> str:

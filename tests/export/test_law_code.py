@@ -171,7 +171,6 @@ test_requests_that_are_refused = refusals(
         for target in SUBROUTINES
         if "gapcon" in target
     ),
-    ("jax-law", "hardened", HEAT, "leave the hardness out"),
     ("c-law", "calibrated", {"kappa": 3.0}, "kappa must be"),
     ("cobol-law", "mbma", {}, "target must be one of"),
     ("c-law", "mbma", {"name": "1 x"}, "a name must be a letter"),

@@ -243,7 +243,7 @@ def test_python_reads_every_name_that_is_taken(tmp_path):
 @pytest.mark.usefixtures("quickly_made")
 def test_octave_reads_every_name_that_is_taken(tmp_path):
     names = accepted("matlab-law")
-    assert not {"end", "function", "for", "ones", "place", "error"} & set(names)
+    assert not {"end", "function", "for", "ones", "error"} & set(names)
     for name in names:
         (tmp_path / f"{name}.m").write_text(
             law_points.text("matlab-law", "mbma", name=name)

@@ -162,7 +162,7 @@ def leakage_law(
         -bottom, 1 / span, [side], [pieces], first, (law.block[fit.LOWEST], top)
     )
     block.view(np.int64)[fit.ENDS] = blocked
-    error = float(errors[:, 0].max()) + _between_nodes(pieces.records, values)
+    error = float(errors[:, 0].max()) + fit.between_nodes(pieces.records, values)
     if law.gaps is not None:
         # bodies apart: the h_rms of the wide gap that continues it
         missed = 1 - float(values(np.array(1.0))[0]) / ((law.h_max + top) / 2) ** 3
@@ -191,11 +191,3 @@ def _ends(law: Any, direction: float | None) -> tuple[float, tuple[float, ...]]:
             "the map is blocked in this direction at its lightest simulated load: there is no leakage law"
         )
     return bottom, tuple(turn for turn in {max(ends), first} if turn > bottom)
-
-
-def _between_nodes(records: FloatArray, values: fit.Values) -> float:
-    """Relative error midway between the nodes of the fit, because kinks of the flow may not affect its coefficients."""
-    t = np.cos(np.pi * np.arange(fit.SAMPLES + 1) / fit.SAMPLES)
-    x = np.minimum(records[:, fit.CENTRE, None] + t / records[:, fit.RATE, None], 1.0)
-    found = np.polynomial.polynomial.polyval(t, records[:, fit.FORCE_AT : fit.AREA_AT].T)
-    return float(np.abs(found / values(x.ravel())[0].reshape(x.shape) - 1).max())

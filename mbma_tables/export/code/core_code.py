@@ -3,18 +3,16 @@
 import functools
 import re
 import zlib
-from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.contacts.law import block as at
-from mbma_tables.export.code.language import AskedLaw
+from mbma_tables.export.code.language import FOLDER, AskedLaw, evaluator
 from mbma_tables.export.text import (
     braces,
     core_file,
-    filled,
-    number,
     numerals,
     template,
     wrapped,
@@ -38,44 +36,22 @@ _DEFINED = re.compile(
 
 
 def blocks_of(asked: AskedLaw) -> dict[str, FloatArray]:
-    """Blocks of the law, of the elastic law whose slope functions follow, and of leakage."""
-    blocks = {"LAW": asked.exported.law.block}
-    if asked.yields:
-        blocks["ELASTIC"] = asked.sloped.block
-    if "leakage" in asked.more:
-        blocks["FLOW"] = asked.exported.leakage.block
-    if asked.gas is not None:
-        blocks["GAS"] = asked.gas.block
-    return blocks
+    """Blocks of the laws and curves of a file, by name."""
+    blocks = {name: law.block for name, law in asked.laws.items()}
+    return blocks | {f"{name}_curve": curve.block for name, curve in asked.curves.items()}
 
 
-def core_places(asked: AskedLaw, places: Mapping[str, str]) -> dict[str, str]:
+def core_places(asked: AskedLaw) -> dict[str, Any]:
     """Places of the template of C: the core's code, and the law's blocks as data."""
-    name = asked.name
-    data = [_data(f"{name}_{of}", block) for of, block in blocks_of(asked).items()]
-    leakage = asked.more.get("leakage", "")
-    declared = filled(
-        "code/languages/law.h",
-        each=dict.fromkeys(asked.slopes, ""),
-        HEADER="",
-        NAME=name,
-        LEAKAGE=leakage,
-        GAS="" if asked.gas is None else "yes",
-    )
-    texts = {
-        "CORE": core_text(name),
-        "CODE": _code_mark(),
-        "DECLARED": declared.lstrip(),
-        "LAWS": "".join(data).rstrip(),
+    data = []
+    for name, block in blocks_of(asked).items():
+        variable = name.upper() if name in asked.laws else f"{name[:-6]}_CURVE"
+        data.append(_data(f"{asked.name}_{variable}", block))
+    return {
+        "core": core_text(asked.name),
+        "code_mark": _code_mark(),
+        "data": "".join(data).rstrip(),
     }
-    return texts | roughness_place(asked)
-
-
-def roughness_place(asked: AskedLaw) -> dict[str, str]:
-    """The roughness, which flow through gaps of parted bodies depends on."""
-    if "leakage" not in asked.more:
-        return {}
-    return {"FLOW_H_RMS": number(asked.exported.leakage.h_rms)}
 
 
 def core_text(prefix: str) -> str:
@@ -88,6 +64,7 @@ def core_text(prefix: str) -> str:
     for text in texts:
         names = _DEFINED.findall(text)
         lines.extend(f"#define {name} {prefix}_{name}" for name in names)
+    texts.append(evaluator("law.c"))
     lines.extend(re.sub(r'^#include ".*"\n', "", text, flags=re.M) for text in texts)
     return "\n".join(lines)
 
@@ -97,7 +74,7 @@ def _code_mark() -> str:
     """A number of all code that laws in one file share, where other code is refused."""
     code = core_text("")
     for name in ("law.c", "interfaces.c", "uinter.c", "gapcon.c"):
-        code += template(f"code/languages/{name}")
+        code += template(f"{FOLDER}/{name}")
     return f"0x{zlib.crc32(code.encode()):08x}"
 
 

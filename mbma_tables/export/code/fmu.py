@@ -93,15 +93,12 @@ def fmu(
         "NAME": name,
         "TOKEN": token,
         "START": variables[1]["start"],
-        "LEAKAGE": found.more.get("leakage", ""),
-        "GAS": "" if found.gas is None else "yes",
-        "SLOPED": "LAW" if found.sloped is exported.law else "ELASTIC",
+        "functions": list(found.functions),
         "LEAST": number(exported.c_least, infinity="INFINITY"),
         "MOST": number(exported.c_most),
     }
     source = filled(
         "code/fmu.c",
-        each={what: number(ratio) for what, ratio in found.slopes.items()},
         **parts,
     )
     built = _binaries(name, source, binaries)
@@ -194,7 +191,10 @@ def _variables(found: AskedLaw) -> list[dict[str, str]]:
         "tangent": (f"{stress}/{length}", "derivative of pressure by overclosure"),
         "area": ("1", "area of contact over nominal area"),
         "energy": (f"{stress} {length}", "integral of pressure over overclosure"),
-        **{name: (unit, SAID[name]) for name, unit in found.more.items()},
+        **{
+            name: (function.unit, SAID.get(name, function.meaning))
+            for name, function in found.functions.items()
+        },
     }
     said = "h_max less the mean separation"
     return [

@@ -1,22 +1,16 @@
 """What a language states of itself, for contact laws as source code, and what it is handed."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.contacts.law.law import ContactLaw
+from mbma_tables.export.code.curves import Curve
 from mbma_tables.export.exported_law import ExportedLaw
-from mbma_tables.export.gas_law import GasLaw
-from mbma_tables.export.text import number
+from mbma_tables.export.text import file, number, rendered
 
-# functions that are there where they are asked for; the first two are slopes times a ratio
-MORE = (
-    "solid_conductance",
-    "tangential_stiffness",
-    "gas_conductance",
-    "total_conductance",
-    "leakage",
-)
+# functions of every law; those of other quantities are called by their names
 FUNCTIONS = (
     "pressure",
     "tangent",
@@ -25,9 +19,21 @@ FUNCTIONS = (
     "area",
     "energy",
     "overclosure",
-    *MORE,
 )
 NAN = "Outside the range: NaN."
+# folder of templates and evaluators, from that of `export` on
+FOLDER = "code/languages"
+
+
+@dataclasses.dataclass(frozen=True)
+class Function:
+    """A quantity as a function of overclosure: a ratio to the slope of a law, and a curve, added."""
+
+    unit: str
+    meaning: str
+    ratio: float = 0.0
+    law: str = "law"  # whose slope it is, of `AskedLaw.laws`
+    curve: str = ""  # of `AskedLaw.curves`; empty for none
 
 
 class AskedLaw(NamedTuple):
@@ -35,16 +41,32 @@ class AskedLaw(NamedTuple):
 
     name: str  # prefix of functions, or name of the module or package
     exported: ExportedLaw
-    slopes: dict[str, float]  # ratios of functions to the slope of a law,
-    sloped: ContactLaw  # of the contact without a hardness
-    more: dict[str, str]  # units of the requested quantities of `MORE`
+    # "law", and "elastic" of the contact without a hardness where functions need it
+    laws: dict[str, ContactLaw]
+    functions: dict[str, Function]  # of further quantities
+    curves: dict[str, Curve]
     said: tuple[str, ...]  # lines of the header
-    gas: GasLaw | None = None  # in the gaps
 
-    @property
-    def yields(self) -> bool:
-        """Whether functions follow an unloading stiffness, which is not the law's own slope."""
-        return self.sloped is not self.exported.law
+
+def evaluator(name: str) -> str:
+    """The text of a plain file that evaluates any law, from its folder."""
+    return file(f"{FOLDER}/evaluators/{name}")
+
+
+class Program(NamedTuple):
+    """A program that asks a law, which tests run: it writes the values of functions at the overclosures of c.txt."""
+
+    file: str
+    #: a template, of `name` and `functions`: it writes a line of values.txt for each line of
+    #: c.txt, a number for each function
+    text: str
+    commands: tuple[str, ...]  # that build and run it beside the law, road.END
+    end: str  # of the law's file
+    modules: tuple[str, ...] = ()  # of Python that it needs
+
+    def written(self, name: str, functions: Sequence[str]) -> str:
+        """Its text for a law of this name."""
+        return rendered(self.text, name=name, functions=functions)
 
 
 class Beside(NamedTuple):
@@ -60,34 +82,37 @@ def _no_words() -> frozenset[str]:
     return frozenset()
 
 
+def _no_places(asked: AskedLaw) -> dict[str, Any]:
+    return {}
+
+
 @dataclasses.dataclass(frozen=True)
 class Language:
-    """Format of a law in one language; templates are named from the folder of `export` on."""
+    """Format of a law in one language: a plain file that evaluates any law, and a template of the law's numbers.
+
+    Both are named by their files in `languages`.
+    """
 
     template: str
     mark: str  # of comments
     usage: str  # lines of the header: of {name} and {interface}
     call: str  # of a function, with {name}, {what} and {x}
-    # places of the template that hold the law itself, from the law and the other places
-    law_places: Callable[[AskedLaw, Mapping[str, str]], dict[str, str]]
+    program: Program
+    evaluator: str = ""
     number: Callable[[float], str] = number
-    # `each` of the template, functions and numbers, by default those that are slopes times a ratio
-    repeated: Callable[[AskedLaw], dict[str, str]] | None = None
-    parts: Mapping[str, str] = dataclasses.field(default_factory=dict)  # other places
-    # the flow where contact blocks it: not known from an overclosure on, and none
-    unknown: str = "(c >= {} ? (double)NAN : 0.0)"
-    none: str = "0.0"
+    # a column, or rows of polynomials, where the language has numbers of laws and curves
+    array: Callable[[FloatArray], str] | None = None
+    booleans: tuple[str, str] = ("false", "true")
+    # further places of the template, from the law
+    places: Callable[[AskedLaw], dict[str, Any]] = _no_places
+    parts: Mapping[str, str] = dataclasses.field(
+        default_factory=dict
+    )  # the same of all laws
     beside: tuple[Beside, ...] = ()  # other files of the target
     alone: bool = True  # whether the first file can be used without those beside it
     # names that it cannot have, in small letters
     reserved: Callable[[], frozenset[str]] = _no_words
     inverts: bool = True  # whether it has the function `overclosure`
-    # whether functions may follow the unloading stiffness of contact that yields
-    unloads: bool = True
     subroutine: str = ""  # routine of a solver, where it calls the law: of a template
     conductance_alone: bool = False  # whether the solver asks for nothing else
     frictionless: bool = False  # whether the solver's own friction is lost
-
-    def ratios(self, asked: AskedLaw) -> dict[str, str]:
-        """Ratios of functions to the slope of the law."""
-        return {what: self.number(ratio) for what, ratio in asked.slopes.items()}

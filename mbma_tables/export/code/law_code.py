@@ -3,20 +3,40 @@
 It is the core's own C (`core_code`), or polynomials in a template a language (`polynomials`).
 """
 
+import dataclasses
 import functools
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from mbma_tables.bodies.bodies import Bodies
 from mbma_tables.common.errors import InputError
-from mbma_tables.contacts.law import block as at
+from mbma_tables.contacts.law.law import ContactLaw
 from mbma_tables.contacts.quantities.gas import VACUUM
+from mbma_tables.contacts.quantities.registry import registry
 from mbma_tables.effects.force_law import ForceLaw
-from mbma_tables.export.code.language import FUNCTIONS, AskedLaw, Beside, Language
+from mbma_tables.export.code.functions import Functions
+from mbma_tables.export.code.language import (
+    FOLDER,
+    FUNCTIONS,
+    AskedLaw,
+    Beside,
+    Function,
+    Language,
+    evaluator,
+)
 from mbma_tables.export.code.languages import LANGUAGES
-from mbma_tables.export.exported_law import ExportedLaw, GasInGaps, exported_law
-from mbma_tables.export.gas_law import gas_law
-from mbma_tables.export.targets import CODE, Target
-from mbma_tables.export.text import about, checked_name, filled, number, opening
+from mbma_tables.export.code.polynomials import curve_numbers, law_numbers
+from mbma_tables.export.exported_law import (
+    ExportedLaw,
+    GasInGaps,
+    exported_law,
+    with_conductivity,
+)
+from mbma_tables.export.targets import CODE, Target, require_quantity
+from mbma_tables.export.text import about, checked_name, filled, inert, number, opening
 from mbma_tables.surfaces.any_surface import AnySurface
 
 # where none is given
@@ -44,6 +64,10 @@ def law_text(
         cylinder (`RoughContact.law`) alone: its "pressure" is force.
     name : str
         What functions, modules or packages are called, or begin with; "law" by default.
+    quantity : str or sequence of str, optional
+        Further quantities of a contact by name, each a function: whatever the registry has
+        that is positive, or negative, from first contact on. What they need is in `E_star`,
+        which may be `Bodies`, and in `conductivity`.
     leakage : bool
         The function `leakage` as well, the flow coefficient K of the gaps [length^3], as
         `ContactLaw.leakage`.
@@ -56,8 +80,8 @@ def law_text(
     Raises
     ------
     InputError, OutOfRangeError
-        As `describe_law`; for conductance and tangential stiffness with a hardness in
-        Python and MATLAB, and for leakage of a target that is a user subroutine.
+        As `describe_law`; for leakage and other quantities of a target that is a user
+        subroutine, and for quantities that are zero or not known at light contact.
 
     Examples
     --------
@@ -82,9 +106,11 @@ def law_files(
     if target not in LANGUAGES:
         raise InputError(f"target must be one of {tuple(LANGUAGES)}, got {target!r}")
     language = LANGUAGES[target]
-    if language.subroutine and (asked.get("leakage") or isinstance(surface, ForceLaw)):
+    more = asked.get("leakage") or asked.get("quantity") or isinstance(surface, ForceLaw)
+    if language.subroutine and more:
         raise InputError(
-            f"{target} has no place for leakage, nor for the force of a body: leave it out"
+            f"{target} has no place for leakage or other quantities, nor for the force of a "
+            "body: leave it out"
         )
     if language.conductance_alone:
         # so that a missing conductivity is refused
@@ -99,69 +125,74 @@ def law_files(
 
 def asked_law(
     surface: AnySurface | ForceLaw,
-    E_star: float | str = 1.0,
+    E_star: float | str | Bodies = 1.0,
     name: str = NAME,
     conductivity: float | None = None,
     conductivity_unit: str | None = None,
     kappa: float | None = None,
     leakage: bool = False,
     gas: GasInGaps | None = None,
+    quantity: str | Sequence[str] | None = None,
     notes: tuple[str, ...] = (),
     **options: Any,
 ) -> AskedLaw:
     """The law for a requested file, made once; arguments as for `law_text`."""
-    checked_name(name, MAX_NAME, FUNCTIONS, "a function of the law")
+    checked_name(name, MAX_NAME, {*FUNCTIONS, *registry()}, "a function of the law")
     conducts = conductivity is not None or conductivity_unit is not None
-    if isinstance(surface, ForceLaw) and (conducts or leakage):
+    wanted = _names(quantity)
+    if isinstance(surface, ForceLaw) and (conducts or leakage or wanted):
         raise InputError(
-            "a force law has neither conductance nor leakage: leave conductivity and leakage "
-            "out"
+            "a force law has neither conductance nor leakage, nor other quantities: leave "
+            "conductivity, leakage and quantity out"
         )
-    exported = exported_law(surface, E_star, **options)
-    ratios: dict[str, float] = {}
-    units: dict[str, str] = {}
+    bodies = E_star
+    if wanted and conductivity is not None and not isinstance(E_star, Bodies):
+        # quantities need it as that of the bodies
+        hardness = options.get("hardness", math.inf)
+        bodies = with_conductivity(E_star, hardness, conductivity, conductivity_unit)
+    exported = exported_law(surface, bodies, **options)
+    parts = Functions(exported)
     if conducts:
-        ratios["solid_conductance"], units["solid_conductance"] = exported.slope(
-            "solid_conductance", conductivity, conductivity_unit
+        parts.add_ratio(
+            "solid_conductance",
+            *exported.slope("solid_conductance", conductivity, conductivity_unit),
         )
     if kappa is not None:
-        ratios["tangential_stiffness"], units["tangential_stiffness"] = exported.slope(
-            "tangential_stiffness", kappa=kappa
+        parts.add_ratio(
+            "tangential_stiffness", *exported.slope("tangential_stiffness", kappa=kappa)
         )
-    of_gas = None
     if conducts and gas is not None and gas.gas.name != VACUUM:
-        of_gas = gas_law(exported, gas)
-        for name_of_heat in ("gas_conductance", "total_conductance"):
-            units[name_of_heat] = units["solid_conductance"]
-        notes = (
-            *notes,
-            f"gas_conductance is within {of_gas.error:.1e} of the theory's, relative to it, "
-            "or to that at first contact where that is larger",
-        )
-    if leakage:
-        units["leakage"] = f"{exported.length}^3"
-    # these functions follow the unloading stiffness
-    sloped, factor = exported.law.unloading() if ratios else (exported.law, 1.0)
-    slopes = {quantity: factor * ratio for quantity, ratio in ratios.items()}
+        parts.add_gas(gas)
+    if leakage or "leakage" in wanted:
+        parts.add_flow()
+    for one in wanted:
+        parts.add(one)
+    notes = (*notes, *parts.notes())
     if conducts:
-        notes = (
-            *notes,
-            *exported.of_gas(
-                gas, units["solid_conductance"], exported.c_turn, included=False
-            ),
-        )
+        unit = parts.functions["solid_conductance"].unit
+        notes = (*notes, *exported.of_gas(gas, unit, exported.c_turn, included=False))
     said = exported.header(
-        _contents(exported, units),
+        _contents(exported, parts.functions),
         _range(exported),
         _inverse_range(exported),
         *notes,
         end=exported.c_turn,
-        leakage=leakage,
+        leakage="leakage" in parts.functions,
     )
-    return AskedLaw(name, exported, slopes, sloped, units, said, of_gas)
+    return AskedLaw(name, exported, parts.laws, parts.functions, parts.curves, said)
 
 
-def _contents(exported: ExportedLaw, units: dict[str, str]) -> str:
+def _names(quantity: str | Sequence[str] | None) -> list[str]:
+    """Names of the quantities that are wanted, each a function that not every law has."""
+    if quantity is None:
+        return []
+    names = [quantity] if isinstance(quantity, str) else list(quantity)
+    for name in names:
+        require_quantity(name)
+    return [name for name in dict.fromkeys(names) if name not in FUNCTIONS]
+
+
+def _contents(exported: ExportedLaw, more: Mapping[str, Function]) -> str:
     """The line of a header on the functions of a law."""
     length = exported.length
     stress = exported.stress
@@ -170,7 +201,7 @@ def _contents(exported: ExportedLaw, units: dict[str, str]) -> str:
         f"tangent dp/dc [{stress}/{length}]",
         "area A/A0",
         f"energy, the integral of pressure [{stress} {length}]",
-        *(f"{quantity} [{unit}]" for quantity, unit in units.items()),
+        *(f"{name} [{function.unit}]" for name, function in more.items()),
     ]
     return f"{', '.join(functions)}, against overclosure c [{length}]"
 
@@ -194,87 +225,122 @@ def _inverse_range(exported: ExportedLaw) -> str:
 def text_of(target: str, asked: AskedLaw, file: Beside | None = None) -> str:
     """The text of a target's own file, or of one beside it."""
     language = LANGUAGES[target]
-    if asked.yields and not language.unloads:
-        raise InputError(
-            f"{target} has no place for an unloading stiffness, which conductance and "
-            "tangential stiffness of yielded contact follow: leave the hardness out, or take "
-            "c-law, fortran-law, javascript-law, modelica-law or an FMU"
-        )
-    places = _common_places(language, asked)
-    if file is not None:
-        places |= file.parts
-    places |= language.law_places(asked, places)
-    if language.subroutine:
-        routine = language.subroutine
-        places["SUBROUTINE"] = filled(f"code/languages/{routine}.c", **places)
-        # chooses the law by the name of the surface interaction
-        places["DISPATCHER"] = filled(
-            "code/languages/interfaces.c",
-            **places,
-            ROUTINE=routine,
-            LISTS=routine.upper(),
-        )
-    template = language.template
-    if file is not None and file.template:
-        template = file.template
-    repeated = language.repeated or language.ratios
-    return filled(template, each=repeated(asked), **places)
-
-
-def _common_places(language: Language, asked: AskedLaw) -> dict[str, str]:
-    """Places of templates that are the same in all languages, but for the form of numbers."""
-    exported = asked.exported
-    law = exported.law
+    pieces = _pieces(language, asked)
+    functions = []
+    for name, function in asked.functions.items():
+        functions.append(_function(language, name, function, pieces))
     # as solvers read the name of a surface interaction
     interface = asked.name.upper()
+    conductance = "total_conductance"
+    if conductance not in asked.functions:
+        conductance = (
+            "solid_conductance" if "solid_conductance" in asked.functions else ""
+        )
+    places = {
+        "name": asked.name,
+        "header": _header(language, asked, interface),
+        "length": asked.exported.length,
+        "stress": asked.exported.stress,
+        "evaluator": evaluator(language.evaluator) if language.evaluator else "",
+        "laws": list(asked.laws),
+        "law": pieces["law"]["plain"],
+        "pieces": pieces,
+        "functions": functions,
+        "conductance": conductance,
+        "subroutine": language.subroutine,
+        "interface": interface,
+        **language.parts,
+        **language.places(asked),
+    }
+    template = language.template
+    if file is not None:
+        places |= file.parts
+        template = file.template or template
+    return filled(f"{FOLDER}/{template}", **places)
+
+
+def _header(language: Language, asked: AskedLaw, interface: str) -> str:
+    """The opening comments of a file."""
     # the lines of the law may have braces of their own
     said = [line.replace("{", "{{").replace("}", "}}") for line in asked.said]
-    paragraphs = [*said, language.usage, _example(exported, language)]
+    paragraphs = [*said, language.usage, _example(asked.exported, language)]
     lines = [line.format(name=asked.name, interface=interface) for line in paragraphs]
-    # where pressure is defined first: at contact, or at the law's largest gap
-    first = 0.0 if exported.ends else (law.h_max - law.highest) / 2
+    return opening(lines, language.mark)
+
+
+def _pieces(language: Language, asked: AskedLaw) -> dict[str, Any]:
+    """Numbers of all laws and curves as a language has them, those of polynomials where it evaluates them itself."""
+    pieces: dict[str, Any] = {}
+    evaluates = language.array is not None
+    for name, law in asked.laws.items():
+        numbers = _range_numbers(asked.exported, law)
+        pieces[name] = _written(
+            language, numbers | (law_numbers(law) if evaluates else {})
+        )
+    # a language without an evaluator calls another one
+    for name, curve in asked.curves.items() if language.evaluator else ():
+        plain: dict[str, Any] = dataclasses.asdict(curve)
+        del plain["block"], plain["error"]
+        plain["from_contact"] = curve.from_contact
+        numbers = plain | (
+            curve_numbers(curve, asked.exported.law.h_max) if evaluates else {}
+        )
+        pieces[f"{name}_curve"] = _written(language, numbers) | {"curve": curve}
+    return pieces
+
+
+def _range_numbers(exported: ExportedLaw, law: ContactLaw) -> dict[str, Any]:
+    """The range of a law, and where its pressure begins and turns down."""
+    own = dataclasses.replace(exported, law=law)
     return {
-        "HEADER": opening(lines, language.mark),
-        "NAME": asked.name,
-        "SUBROUTINE": "",
-        "INTERFACE": interface,
-        "LENGTH": exported.length,
-        "STRESS": exported.stress,
-        "H_MAX": language.number(law.h_max),
-        "FIRST": language.number(first),
-        "C_TURN": language.number(exported.c_turn),
-        "C_LEAST": language.number(exported.c_least),
-        "C_MOST": language.number(exported.c_most),
-        "CONDUCTANCE": language.ratios(asked).get("solid_conductance", ""),
-        **_of_gas(language, asked),
-        "LEAKAGE": asked.more.get("leakage", ""),
-        "CLOSED": _where_blocked(language, asked),
-        "ELASTIC": "yes" if asked.yields else "",
-        "SLOPED": "ELASTIC" if asked.yields else "LAW",
-        **language.parts,
+        "h_max": law.h_max,
+        "ends": own.ends,
+        # where pressure is defined first: at contact, or at the law's largest gap
+        "first": 0.0 if own.ends else (law.h_max - law.highest) / 2,
+        "c_turn": own.c_turn,
+        "c_least": own.c_least,
+        "c_most": own.c_most,
+        "length": own.length,
+        "stress": own.stress,
     }
 
 
-def _of_gas(language: Language, asked: AskedLaw) -> dict[str, str]:
-    """Places of the conductance of a gas; SOLID is there where solid spots alone conduct."""
-    conducts = "solid_conductance" in asked.slopes
-    if asked.gas is None:
-        return {"GAS": "", "SOLID": "yes" if conducts else ""}
+def _written(language: Language, numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """Numbers and arrays as a language writes them, and how many records there are."""
+    plain = {}
+    arrays = {}
+    records = 0
+    for name, value in numbers.items():
+        if isinstance(value, np.ndarray):
+            assert language.array is not None
+            arrays[name] = language.array(value)
+            records = max(records, len(value))
+        elif isinstance(value, bool):
+            plain[name] = language.booleans[value]
+        elif isinstance(value, float):
+            plain[name] = language.number(value)
+        elif isinstance(value, str):
+            plain[name] = f"'{value}'"
+        else:
+            plain[name] = str(value)
+    return {"plain": plain, "arrays": arrays, "records": records}
+
+
+def _function(
+    language: Language, name: str, function: Function, pieces: Mapping[str, Any]
+) -> dict[str, Any]:
+    """A function as templates have it."""
+    curve = None
+    if function.curve:
+        numbers = pieces.get(f"{function.curve}_curve", {"plain": {}})
+        curve = {"name": function.curve} | numbers["plain"]
     return {
-        "GAS": "yes",
-        "SOLID": "",
-        "GAS_OFFSET": language.number(asked.gas.offset),
-        "GAS_FAR": language.number(asked.gas.far),
-        "GAS_JUMP": language.number(asked.gas.jump),
-        "GAS_TOP": language.number(float(asked.gas.block[at.HIGHEST])),
+        "name": name,
+        "meaning": inert(function.meaning),
+        "law": function.law if function.ratio else "",
+        "ratio": language.number(function.ratio),
+        "curve": curve,
     }
-
-
-def _where_blocked(language: Language, asked: AskedLaw) -> str:
-    """The flow where contact blocks it at c: none, or not known of contact that yields."""
-    if "leakage" not in asked.more or asked.exported.unknown_from == math.inf:
-        return language.none
-    return language.unknown.format(language.number(asked.exported.unknown_from))
 
 
 def _example(exported: ExportedLaw, language: Language) -> str:
@@ -301,7 +367,7 @@ def _target(name: str, language: Language) -> Target:
     return Target(
         name,
         functools.partial(law_files, name),
-        CODE - {"leakage"} if language.subroutine else CODE,
+        CODE - {"leakage", "quantity"} if language.subroutine else CODE,
         rows=False,
         alone=language.alone,
         beside=tuple(file.end for file in language.beside),

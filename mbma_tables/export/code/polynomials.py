@@ -8,13 +8,11 @@ They are polynomials in order of rising overclosure c. Record k, which holds whe
     dp/dc = scale rate dp/dt,   energy = energy_0 + t sum_j p[j] t^j/(j + 1)/(scale rate).
 
 Where contact ends at c = 0 the first record's polynomials are multiplied by t^power.
-Leakage has records of its own against x = scale (d - blocked) with the gap d = h_max - 2 c;
-with a power the first one is multiplied by it, and K is zero at and below x = 0. Where
-bodies are apart, K is u^3 (1 - 1.5/((u/h_rms)^2 + 4)).
+A curve of another quantity has records of its own, against x = scale c, or x = scale (d -
+blocked) with the gap d = h_max - 2 c. With a power the first one is multiplied by it.
 """
 
 import math
-from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -32,8 +30,7 @@ from mbma_tables.contacts.law.block import (
     SCALE,
 )
 from mbma_tables.contacts.law.law import ContactLaw
-from mbma_tables.contacts.law.leakage import LeakageLaw
-from mbma_tables.export.code.language import AskedLaw
+from mbma_tables.export.code.curves import Curve
 from mbma_tables.export.text import number, wrapped
 
 # steps of coefficients over the least value and the least slope of a polynomial; flatter
@@ -45,13 +42,6 @@ FLAT = 1e-4
 MOST_DECIMALS = 400
 
 
-class Notation(NamedTuple):
-    """How a language writes numbers."""
-
-    number: Callable[[float], str]
-    array: Callable[[FloatArray], str]  # a column, or rows of polynomials
-
-
 class _Side(NamedTuple):
     """Records on one side of a block."""
 
@@ -59,63 +49,53 @@ class _Side(NamedTuple):
     records: FloatArray
 
 
-def polynomial_places(asked: AskedLaw, notation: Notation) -> dict[str, str]:
-    """Places of a template that hold the polynomials of a law, and of its leakage."""
-    places = law_places(asked.exported.law, notation)
-    if "leakage" in asked.more:
-        places |= _written("FLOW_", flow_numbers(asked.exported.leakage), notation)
-    if asked.gas is not None:
-        places |= _written("GAS_", record_numbers(asked.gas.block), notation)
-    return places
-
-
-def law_places(law: ContactLaw, notation: Notation) -> dict[str, str]:
-    """Places of a template that hold the polynomials of a law."""
-    return _written("", law_numbers(law), notation)
-
-
-def _written(
-    prefix: str, numbers: Mapping[str, float | FloatArray], notation: Notation
-) -> dict[str, str]:
-    places = {}
-    for name, value in numbers.items():
-        if isinstance(value, np.ndarray):
-            text = notation.array(value)
-        elif isinstance(value, float):
-            text = notation.number(value)
-        else:
-            text = str(value)
-        places[f"{prefix}{name}".upper()] = text
-    return places
-
-
-def flow_numbers(leakage: LeakageLaw) -> dict[str, float | FloatArray]:
-    """Numbers of a law's leakage, by name."""
-    return record_numbers(leakage.block) | {"h_rms": leakage.h_rms}
-
-
-def record_numbers(head: FloatArray) -> dict[str, float | FloatArray]:
-    """Numbers of a block of one side, by name."""
-    side = _sides(head)[0]
-    records = side.records
-    return {
-        "blocked": -float(head[at.H_MAX]),
-        "scale": float(head[SCALE]),
-        "power": float(head[POWER_F]),
-        "edges": side.begins[1:],
-        "centre": records[:, CENTRE],
-        "rate": records[:, RATE],
-        "p": records[:, FORCE_AT:AREA_AT],
-        "records": len(records),
-    }
-
-
 def law_numbers(law: ContactLaw) -> dict[str, float | FloatArray]:
     """Numbers of a law, by name."""
     head = law.block
-    scale = 2 * float(head[SCALE])
     ends = law.highest == math.inf
-    sides = _sides(law.block)
+    side, edges, records, signs = _in_order(law.block, law.h_max, ends)
+    return {
+        "side": side,
+        "scale": 2 * float(head[SCALE]),
+        "power_p": float(head[POWER_F]) if ends else 0.0,
+        "power_a": float(head[at.POWER_A]) if ends else 0.0,
+        "edges": edges,
+        "centre": signs * records[:, CENTRE],
+        "rate": signs * records[:, RATE],
+        "energies": records[:, ENERGY_AT] / 2,
+        "p": records[:, FORCE_AT:AREA_AT],
+        "a": records[:, AREA_AT:ENERGY_AT],
+    }
+
+
+def curve_numbers(curve: Curve, h_max: float) -> dict[str, float | FloatArray]:
+    """Numbers of a curve's polynomials, by name."""
+    head = curve.block
+    scale = float(head[SCALE])
+    if curve.from_contact:
+        scale *= 2
+        side, edges, records, signs = _in_order(head, h_max, ends=True)
+    else:
+        begins, records = _sides(head)[0]
+        side, edges, signs = len(records), begins[1:], np.ones(len(records))
+    return {
+        "side": side,
+        "blocked": -float(head[at.H_MAX]),
+        "scale": scale,
+        "power": float(head[POWER_F]),
+        "edges": edges,
+        "centre": signs * records[:, CENTRE],
+        "rate": signs * records[:, RATE],
+        "p": records[:, FORCE_AT:AREA_AT],
+    }
+
+
+def _in_order(
+    block: FloatArray, h_max: float, ends: bool
+) -> tuple[int, FloatArray, FloatArray, FloatArray]:
+    """Records in order of overclosure: how many are from first contact on, edges, records, and signs of their x."""
+    scale = 2 * float(block[SCALE])
+    sides = _sides(block)
     edges: list[FloatArray] = []
     parts: list[FloatArray] = []
     side = 0
@@ -128,25 +108,11 @@ def law_numbers(law: ContactLaw) -> dict[str, float | FloatArray]:
         # towards full compression an end belongs to the record of larger gaps, also where
         # the sides meet
         above = np.append(begins[1:], 1.0)[::-1]
-        edges.append(np.nextafter(law.h_max * scale - above, math.inf))
+        edges.append(np.nextafter(h_max * scale - above, math.inf))
         parts.append(records_of_side[::-1])
     records = np.concatenate(parts)
     signs = np.where(np.arange(len(records)) < side, 1.0, -1.0)
-    return {
-        "h_max": law.h_max,
-        "side": side,
-        "scale": scale,
-        "ends": int(ends),
-        "power_p": float(head[POWER_F]) if ends else 0.0,
-        "power_a": float(head[at.POWER_A]) if ends else 0.0,
-        "edges": np.concatenate(edges)[1:],
-        "centre": signs * records[:, CENTRE],
-        "rate": signs * records[:, RATE],
-        "energies": records[:, ENERGY_AT] / 2,
-        "p": records[:, FORCE_AT:AREA_AT],
-        "a": records[:, AREA_AT:ENERGY_AT],
-        "records": len(records),
-    }
+    return side, np.concatenate(edges)[1:], records, signs
 
 
 def _sides(block: FloatArray) -> list[_Side]:

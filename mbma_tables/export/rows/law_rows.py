@@ -20,7 +20,13 @@ from mbma_tables.contacts.quantities.effective_medium import LARGEST_AREA
 from mbma_tables.contacts.quantities.interface import NOTHING_BETWEEN, Interface
 from mbma_tables.effects.film import flow_factors
 from mbma_tables.effects.force_law import ForceLaw
-from mbma_tables.export.exported_law import KAPPA, ExportedLaw, GasInGaps, exported_law
+from mbma_tables.export.exported_law import (
+    KAPPA,
+    ExportedLaw,
+    GasInGaps,
+    exported_law,
+    with_conductivity,
+)
 from mbma_tables.export.law_table import (
     MAX_ROWS,
     MIN_ROWS,
@@ -183,7 +189,7 @@ def describe_law(
     theory = "calibrated" if film and theory is None else theory
     bodies = E_star
     if of_registry and conductivity is not None:
-        bodies = _with_conductivity(E_star, hardness, conductivity, conductivity_unit)
+        bodies = with_conductivity(E_star, hardness, conductivity, conductivity_unit)
     exported = exported_law(
         surface,
         bodies,
@@ -423,17 +429,6 @@ def _table(
         more,
         facts,
     )
-
-
-def _with_conductivity(
-    E_star: Any, hardness: float | str, conductivity: float, unit: str | None
-) -> Bodies:
-    """The bodies of a modulus, with a conductivity."""
-    if isinstance(E_star, Bodies):
-        raise InputError("conductivity is that of the bodies: leave it out beside Bodies")
-    text = number(number_in("conductivity", conductivity, 1e-300, 1e300))
-    both = conductivity if unit is None else f"{text} {unit}"
-    return Bodies(E_star, hardness=hardness, conductivity=(both, both))
 
 
 def _rows_of_registry(

@@ -8,10 +8,10 @@ CALLED = (
 )
 # Abaqus has a routine that ends the job
 STOP = {
-    "STOP_DECLARED": (
+    "stop_declared": (
         "SUBROUTINE FOR_NAME(xit, XIT)(void); /* of Abaqus, closes its files */"
     ),
-    "STOP": "FOR_NAME(xit, XIT)()",
+    "stop": "FOR_NAME(xit, XIT)()",
 }
 
 LANGUAGES = {
@@ -38,7 +38,7 @@ LANGUAGES = {
             f"{several_laws('gapcon')} {LAST_VALUE} {CALLED} "
             "Arguments: Abaqus 6.5 to 2017, user subroutines, GAPCON."
         ),
-        parts={"SOLVER": "Abaqus/Standard", **STOP},
+        parts={"solver": "Abaqus/Standard", **STOP},
         conductance_alone=True,
     ),
 }

@@ -3,12 +3,36 @@
 import functools
 
 from mbma_tables.export.code.core_code import core_places
-from mbma_tables.export.code.language import NAN, Beside, Language
+from mbma_tables.export.code.language import NAN, Beside, Language, Program
 from mbma_tables.export.text import number
+
+PROGRAM = Program(
+    "ask.c",
+    """\
+#include <stdio.h>
+{% for function in functions %}
+double {{ name }}_{{ function }}(double c);
+{% endfor %}
+int main(void) {
+    FILE *in = fopen("c.txt", "r"), *out = fopen("values.txt", "w");
+    double c;
+    while (fscanf(in, "%lf", &c) == 1) {
+{% for function in functions %}
+        fprintf(out, "%.17g ", {{ name }}_{{ function }}(c));
+{% endfor %}
+        fprintf(out, "\\n");
+    }
+    return fclose(in) + fclose(out);
+}
+""",
+    ("gcc -std=c99 -O1 road.c ask.c -lm -o ask", "./ask"),
+    ".c",
+)
 
 LANGUAGES = {
     "c-law": Language(
-        template="code/languages/law.c",
+        template="law.c",
+        evaluator="law.c",
         mark="/*",
         usage=(
             "C99, also C++11: cc -O2 -c {name}.c, link with -lm; {name}.h beside it declares "
@@ -16,8 +40,9 @@ LANGUAGES = {
             f"{NAN}"
         ),
         call="{name}_{what}({x})",
-        law_places=core_places,
-        number=functools.partial(number, infinity="INFINITY"),
-        beside=(Beside(".h", "code/languages/law.h"),),
+        program=PROGRAM,
+        number=functools.partial(number, infinity="INFINITY", missing="(double)NAN"),
+        places=core_places,
+        beside=(Beside(".h", "law.h"),),
     )
 }

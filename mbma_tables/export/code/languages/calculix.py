@@ -19,9 +19,9 @@ LANGUAGES = {
         ),
         # its own routines end the job by an exit status
         parts={
-            "SOLVER": "CalculiX",
-            "STOP_DECLARED": "",
-            "STOP": "exit(201) /* as CalculiX's own routines do */",
+            "solver": "CalculiX",
+            "stop_declared": "",
+            "stop": "exit(201) /* as CalculiX's own routines do */",
         },
         conductance_alone=True,
     )

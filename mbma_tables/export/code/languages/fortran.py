@@ -1,15 +1,16 @@
 """Laws in Fortran: a module of elemental functions, on top of the C of the law."""
 
 import functools
-from collections.abc import Mapping
+from typing import Any
 
+from mbma_tables.contacts.quantities.registry import registry
 from mbma_tables.export.code.language import (
     FUNCTIONS,
-    MORE,
     NAN,
     AskedLaw,
     Beside,
     Language,
+    Program,
 )
 from mbma_tables.export.reserved_words import small_words
 from mbma_tables.export.text import number
@@ -20,30 +21,53 @@ NAMES = "dp h_max least_overclosure largest_overclosure"
 
 def _reserved() -> frozenset[str]:
     """Words that name no module with these functions."""
-    return small_words(NAMES, *(f"c_{function}" for function in FUNCTIONS))
+    return small_words(
+        NAMES, *(f"c_{function}" for function in (*FUNCTIONS, *registry()))
+    )
 
 
-def _public(asked: AskedLaw) -> list[str]:
-    """Functions and subroutines of the module."""
-    absent = set(MORE) - set(asked.more)
-    return [function for function in FUNCTIONS if function not in absent]
-
-
-def _law_places(asked: AskedLaw, places: Mapping[str, str]) -> dict[str, str]:
+def _places(asked: AskedLaw) -> dict[str, Any]:
+    """Functions of the module, all alike but `with_tangent`, which is a subroutine."""
+    public = [*FUNCTIONS, *asked.functions]
+    elemental = [function for function in public if function != "with_tangent"]
     # a line each: a line has 132 letters at most
-    return {"PUBLIC": ", &\n    ".join(_public(asked))}
+    return {"public": ", &\n    ".join(public), "elemental": elemental}
 
 
-def _functions(asked: AskedLaw) -> dict[str, str]:
-    """All functions, which are alike; `with_tangent` is a subroutine."""
-    functions = _public(asked)
-    functions.remove("with_tangent")
-    return dict.fromkeys(functions, "")
+PROGRAM = Program(
+    "ask.f90",
+    """\
+program ask
+  use, intrinsic :: iso_fortran_env, only: dp => real64
+  use {{ name }}
+  implicit none
+  real(dp) :: c
+  integer :: status
+  open (10, file="c.txt")
+  open (11, file="values.txt")
+  do
+    read (10, *, iostat=status) c
+    if (status /= 0) exit
+{% for function in functions %}
+    write (11, "(es25.16e3)", advance="no") {{ function }}(c)
+{% endfor %}
+    write (11, *)
+  end do
+end program
+""",
+    (
+        "gcc -std=c99 -O1 -c road_c.c",
+        "gfortran -std=f2008 -Wall -Wextra -Wpedantic -Werror -fcheck=all -O1 road_c.o "
+        "road.f90 ask.f90 -o ask",
+        "./ask",
+    ),
+    ".f90",
+)
 
 
 LANGUAGES = {
     "fortran-law": Language(
-        template="code/languages/law.f90",
+        template="law.f90",
         mark="!",
         usage=(
             "Fortran 2008 on top of {name}_c.c, which is written beside it, by `mbma export "
@@ -51,9 +75,9 @@ LANGUAGES = {
             f"are elemental, of real(c_double). {NAN}"
         ),
         call="{what}({x})",
-        law_places=_law_places,
+        program=PROGRAM,
         number=functools.partial(number, exponent="d", infinity="huge(1d0)"),
-        repeated=_functions,
+        places=_places,
         # the C that the module calls is beside it
         beside=(Beside("_c.c", target="c-law"),),
         alone=False,

@@ -2,30 +2,49 @@
 
 import base64
 import functools
-from collections.abc import Mapping
+from typing import Any
 
-from mbma_tables.export.code.core_code import blocks_of, roughness_place
-from mbma_tables.export.code.language import AskedLaw, Beside, Language
+from mbma_tables.export.code.core_code import blocks_of
+from mbma_tables.export.code.language import AskedLaw, Beside, Language, Program
 from mbma_tables.export.text import number, page_file
 
 # the core's laws, compiled
 LAW_MODULE = "law.wasm"
 
 
-def _law_places(asked: AskedLaw, places: Mapping[str, str]) -> dict[str, str]:
+def _places(asked: AskedLaw) -> dict[str, Any]:
     """The module and the blocks of the law, as text."""
-    contents = {"WASM": page_file(LAW_MODULE)}
-    for of, block in blocks_of(asked).items():
-        contents[f"{of}_BLOCK"] = block.astype("<f8", copy=False).tobytes()
-    texts = roughness_place(asked)
-    for place, content in contents.items():
-        texts[place] = base64.b64encode(content).decode("ascii")
-    return texts
+    blocks = {}
+    for name, block in blocks_of(asked).items():
+        blocks[name] = _as_text(block.astype("<f8", copy=False).tobytes())
+    return {"wasm": _as_text(page_file(LAW_MODULE)), "blocks": blocks}
+
+
+def _as_text(content: bytes) -> str:
+    return base64.b64encode(content).decode("ascii")
+
+
+PROGRAM = Program(
+    "ask.mjs",
+    """\
+import { readFileSync, writeFileSync } from "node:fs";
+import * as {{ name }} from "./{{ name }}.mjs";
+const rows = readFileSync("c.txt", "utf8").trim().split("\\n").map(Number).map((c) => [
+{% for function in functions %}
+  {{ name }}.{{ function }}(c),
+{% endfor %}
+].join(" "));
+writeFileSync("values.txt", rows.join("\\n"));
+""",
+    ("node ask.mjs",),
+    ".mjs",
+)
 
 
 LANGUAGES = {
     "javascript-law": Language(
-        template="code/languages/law.mjs",
+        template="law.mjs",
+        evaluator="law.mjs",
         mark="/*",
         usage=(
             "import {{ pressure, with_tangent, curvature, area, energy, overclosure }} from "
@@ -35,16 +54,14 @@ LANGUAGES = {
             "thrown, of what is no number a TypeError."
         ),
         call="{what}({x})",
-        law_places=_law_places,
-        number=functools.partial(number, infinity="Infinity"),
-        parts={"EXPORT": "export"},
-        unknown="(c >= {} ? NaN : 0)",
+        program=PROGRAM,
+        number=functools.partial(number, infinity="Infinity", missing="NaN"),
+        places=_places,
+        parts={"export": "export"},
         beside=(
-            Beside(
-                ".cjs", "code/languages/law.mjs", parts={"EXPORT": "module.exports ="}
-            ),
-            Beside(".d.mts", "code/languages/law.d.mts"),
-            Beside(".d.cts", "code/languages/law.d.mts"),
+            Beside(".cjs", "law.mjs", parts={"export": "module.exports ="}),
+            Beside(".d.mts", "law.d.mts"),
+            Beside(".d.cts", "law.d.mts"),
         ),
     )
 }

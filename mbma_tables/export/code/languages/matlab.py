@@ -1,41 +1,48 @@
 """Laws in MATLAB and Octave."""
 
 import functools
-from collections.abc import Mapping
 
-from mbma_tables.export.code.language import AskedLaw, Language
-from mbma_tables.export.code.polynomials import Notation, matrix, polynomial_places
+from mbma_tables.export.code.language import FOLDER, Language, Program, evaluator
+from mbma_tables.export.code.polynomials import matrix
 from mbma_tables.export.reserved_words import matlab_words
 from mbma_tables.export.text import number, template
 
-TEMPLATE = "code/languages/law.m"
-
-_notation = Notation(functools.partial(number, infinity="Inf"), matrix)
+TEMPLATE = "law.m"
 
 
 def _reserved() -> frozenset[str]:
     """Words that name no function with a law."""
-    return matlab_words(template(TEMPLATE))
+    return matlab_words(template(f"{FOLDER}/{TEMPLATE}") + evaluator(TEMPLATE))
 
 
-def _law_places(asked: AskedLaw, places: Mapping[str, str]) -> dict[str, str]:
-    return polynomial_places(asked, _notation)
+PROGRAM = Program(
+    "ask.m",
+    """\
+law = {{ name }}(); c = load('c.txt'); values = [];
+{% for function in functions %}
+values(:, end + 1) = law.{{ function }}(c(:));
+{% endfor %}
+file = fopen('values.txt', 'w');
+fprintf(file, [repmat('%.17g ', 1, size(values, 2)), '\\n'], values'); fclose(file);
+""",
+    ("octave-cli --no-init-file ask.m",),
+    ".m",
+)
 
 
 LANGUAGES = {
     "matlab-law": Language(
         template=TEMPLATE,
+        evaluator=TEMPLATE,
         mark="%",
         usage=(
             "MATLAB and Octave: law = {name}(); arrays of any shape. Outside the range: an "
             "error."
         ),
         call="law.{what}({x})",
-        law_places=_law_places,
-        number=_notation.number,
-        # 0/1, or 0/0, which is NaN
-        unknown="0./(c(closed) < {})",
+        program=PROGRAM,
+        number=functools.partial(number, infinity="Inf", missing="NaN"),
+        array=matrix,
         reserved=_reserved,
-        unloads=False,
     )
 }

@@ -2,19 +2,20 @@
 
 import functools
 import re
-from collections.abc import Mapping
+from typing import Any
 
-from mbma_tables.export.code.language import AskedLaw, Language
-from mbma_tables.export.code.polynomials import (
-    Notation,
-    braces,
-    law_places,
-    polynomial_places,
+from mbma_tables.export.code.language import (
+    FOLDER,
+    AskedLaw,
+    Language,
+    Program,
+    evaluator,
 )
+from mbma_tables.export.code.polynomials import braces
 from mbma_tables.export.reserved_words import small_words, words_of_code
-from mbma_tables.export.text import filled, number, template
+from mbma_tables.export.text import number, template
 
-TEMPLATE = "code/languages/law.mo"
+TEMPLATE = "law.mo"
 # Modelica 3.6, sections 2.3.3, 3.7 and 4.9: key words, functions and types that are always
 # there
 KEYWORDS = """
@@ -31,33 +32,76 @@ KEYWORDS = """
     max sum product transpose outerProduct symmetric cross skew array cat interval hold previous
     subSample superSample shiftSample backSample noClock
 """
-# what the text of a package names: constants, and functions
-_DEFINED = re.compile(r"\b(?<!type )(\w+)(?:\[[^]]*\])? = [-\d{]|function (\w+)")
-
-_notation = Notation(functools.partial(number, infinity="1.0e300"), braces)
+# a power of a unit, such as mm^3, which Modelica has as mm3
+_POWER = re.compile(r"([A-Za-z]+)\^(\d)")
 
 
 def _reserved() -> frozenset[str]:
     """Words that name no package with a law."""
-    return small_words(KEYWORDS, "elastic", words_of_code(template(TEMPLATE), "//"))
+    text = template(f"{FOLDER}/{TEMPLATE}") + _functions()
+    return small_words(KEYWORDS, "elastic", words_of_code(text, "//"))
 
 
-def _law_places(asked: AskedLaw, places: Mapping[str, str]) -> dict[str, str]:
-    """The polynomials; of contact that yields with a package of the elastic law inside."""
-    polynomials = polynomial_places(asked, _notation)
-    if not asked.yields:
-        return polynomials | {"SLOPED": "tangent"}
-    elastic = law_places(asked.sloped, _notation)
-    only = {"NAME": "elastic", "HEADER": "", "LEAKAGE": "", "GAS": "", "ELASTIC": ""}
-    text = filled(
-        TEMPLATE, each={}, **{**places, **polynomials, **elastic, **only}
-    ).strip()
-    # some tools confuse names of a package with those of one in it
-    names = "|".join(
-        constant or function for constant, function in _DEFINED.findall(text)
-    )
-    nested = re.sub(rf"\b({names})\b", r"elastic_\1", text)
-    return polynomials | {"SLOPED": "elastic.elastic_tangent", "ELASTIC": nested}
+def _functions() -> str:
+    """The functions of the evaluator, without the package that they are in."""
+    return "\n".join(evaluator(TEMPLATE).splitlines()[1:-1])
+
+
+def _places(asked: AskedLaw) -> dict[str, Any]:
+    """Functions, and units of powers."""
+    units = {}
+    for name, function in asked.functions.items():
+        power = _POWER.fullmatch(function.unit)
+        units[name] = "".join(power.groups()) if power else ""
+    return {"evaluator": _functions(), "units": units}
+
+
+PROGRAM = Program(
+    "ask.py",
+    """\
+import pathlib
+
+import numpy as np
+import rumoca
+
+MODEL = '''
+package asked
+  constant Real gaps[SIZE] = { GAPS };
+  function at
+    input Real time_;
+    output Real c;
+  protected
+    Integer k;
+  algorithm
+    k := integer(floor(time_ + 1.5));
+    c := gaps[k];
+  end at;
+end asked;
+model Ask
+  Real c;
+{% for function in functions %}
+  Real y{{ loop.index }};
+{% endfor %}
+equation
+  c = asked.at(time);
+{% for function in functions %}
+  y{{ loop.index }} = {{ name }}.{{ function }}(c);
+{% endfor %}
+end Ask;
+'''
+c = np.loadtxt("c.txt", ndmin=1)
+gaps = ", ".join(map(repr, c.tolist()))
+model = MODEL.replace("SIZE", str(c.size)).replace("GAPS", gaps)
+pathlib.Path("both.mo").write_text(pathlib.Path("{{ name }}.mo").read_text() + model)
+found = rumoca.Session().load("both.mo", model="Ask").simulate(t=(0, c.size - 1), dt=1)
+assert (np.asarray(found["c"]) == c).all()
+columns = [found[f"y{k + 1}"] for k in range({{ functions|length }})]
+np.savetxt("values.txt", np.transpose(columns), "%.17g")
+""",
+    ("python ask.py",),
+    ".mo",
+    ("rumoca",),
+)
 
 
 LANGUAGES = {
@@ -69,11 +113,10 @@ LANGUAGES = {
             "a tool solves this for c. Outside the range an assertion fails."
         ),
         call="{name}.{what}({x})",
-        law_places=_law_places,
-        number=_notation.number,
-        # of an assertion: Modelica has no NaN
-        unknown="c < {}",
-        none="true",
+        program=PROGRAM,
+        number=functools.partial(number, infinity="1.0e300", missing="0.0"),
+        array=braces,
+        places=_places,
         reserved=_reserved,
         # tools solve for c themselves
         inverts=False,

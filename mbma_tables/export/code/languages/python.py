@@ -3,18 +3,14 @@
 import functools
 import keyword
 import sys
-from collections.abc import Mapping
 
-from mbma_tables.export.code.language import NAN, AskedLaw, Language
-from mbma_tables.export.code.polynomials import Notation, brackets, polynomial_places
+from mbma_tables.export.code.language import NAN, Language, Program
+from mbma_tables.export.code.polynomials import brackets
 from mbma_tables.export.reserved_words import small_words
 from mbma_tables.export.text import number
 
 # modules that a module of the same name would hide from numpy and jax
 PACKAGES = "numpy jax jaxlib scipy ml_dtypes opt_einsum"
-
-_of_numpy = Notation(functools.partial(number, infinity="np.inf"), brackets)
-_of_jax = Notation(functools.partial(number, infinity="jnp.inf"), brackets)
 
 
 def _reserved() -> frozenset[str]:
@@ -22,32 +18,45 @@ def _reserved() -> frozenset[str]:
     return small_words(*keyword.kwlist, *sys.stdlib_module_names, PACKAGES)
 
 
-def _places_of_numpy(asked: AskedLaw, places: Mapping[str, str]) -> dict[str, str]:
-    return polynomial_places(asked, _of_numpy)
+def _program(begin: str, *modules: str) -> Program:
+    text = f"""\\
+{begin}
+import numpy as np
+import {{{{ name }}}}
+c = np.loadtxt("c.txt", ndmin=1)
+values = [
+{{% for function in functions %}}
+    {{{{ name }}}}.{{{{ function }}}}(c),
+{{% endfor %}}
+]
+np.savetxt("values.txt", np.transpose(values), "%.17g")
+"""
+    return Program("ask.py", text, ("python ask.py",), ".py", modules)
 
 
-def _places_of_jax(asked: AskedLaw, places: Mapping[str, str]) -> dict[str, str]:
-    return polynomial_places(asked, _of_jax)
+_DOUBLE = 'import jax\njax.config.update("jax_enable_x64", True)'
 
 
 LANGUAGES = {
     "python-law": Language(
-        template="code/languages/law.py",
+        template="law.py",
+        evaluator="law_numpy.py",
         mark="#",
         usage=(
             "Python with numpy alone: import {name}; arrays of any shape. Outside the range: "
             "ValueError."
         ),
         call="{name}.{what}({x})",
-        law_places=_places_of_numpy,
-        number=_of_numpy.number,
-        unknown="np.where(c >= {}, np.nan, 0.0)",
-        parts={"NP": "np", "NUMPY": "asked", "JAX": ""},
+        program=_program(""),
+        number=functools.partial(number, infinity="np.inf", missing="np.nan"),
+        array=brackets,
+        booleans=("False", "True"),
+        parts={"np": "np"},
         reserved=_reserved,
-        unloads=False,
     ),
     "jax-law": Language(
-        template="code/languages/law.py",
+        template="law.py",
+        evaluator="law_jax.py",
         mark="#",
         usage=(
             "Python with jax alone, differentiable by c, p and the pytree LAW. Set "
@@ -55,11 +64,11 @@ LANGUAGES = {
             f"{NAN}"
         ),
         call="{name}.{what}({x})",
-        law_places=_places_of_jax,
-        number=_of_jax.number,
-        unknown="jnp.where(c >= {}, jnp.nan, 0.0)",
-        parts={"NP": "jnp", "NUMPY": "", "JAX": "asked"},
+        program=_program(_DOUBLE, "jax"),
+        number=functools.partial(number, infinity="jnp.inf", missing="jnp.nan"),
+        array=brackets,
+        booleans=("False", "True"),
+        parts={"np": "jnp"},
         reserved=_reserved,
-        unloads=False,
     ),
 }
