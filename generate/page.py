@@ -42,6 +42,7 @@ PAGES = {
     "data": "pages.simulations:data",
     "fidelity": "pages.simulations:fidelity",
     "joints": "pages.simulations:joints",
+    "tutorials/design": "pages.simulations:design",
     "lubrication": "pages.simulations:lubrication",
     "rough_bodies": "pages.simulations:rough_bodies",
     "cost": "pages.cost:measure",

@@ -6,6 +6,7 @@ Joints, lubrication, rough bodies, fidelity, and the data set.
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ from matplotlib.colors import to_hex
 from generate import distances
 from generate.boundary_elements.run import LIGHT_BINS, compared, surfaces
 from generate.calibrated_file import QUANTITIES, binned, by_bin
-from generate.files import dataset
+from generate.files import ROOT, dataset
 from generate.machined import studies
 from generate.page import Cell, Measured, Picture, panels, percent, table
 from generate.rough_spheres import RADIUS, heights
@@ -119,6 +120,51 @@ def joints() -> Measured:
         "docs/figures/joint_conductance.svg": of_joint,
     }
     return {"light": _light_loads(), "usual": usual}, pictures
+
+
+def design() -> Measured:
+    """The candidates of the tutorial on design and their front, by the blocks of the page itself."""
+    text = (ROOT / "docs" / "tutorials" / "design.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```\{code-cell\}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    names: dict[str, Any] = {}
+    # the first two: the candidates, and the front
+    for block in blocks[:2]:
+        exec(block, names)
+    figure, axes = panels(1, 1, (7.5, 4.6))
+    columns = names["columns"]
+    for number, pair in enumerate(names["candidates"]):
+        chosen = columns["valid"] & (names["names"] == pair)
+        axes.plot(
+            columns["stiffness"][chosen],
+            columns["conductance"][chosen],
+            ".",
+            markersize=2,
+            color=f"C{number}",
+            label=pair,
+            rasterized=True,
+        )
+    front = names["front"]
+    axes.plot(
+        columns["stiffness"][front],
+        columns["conductance"][front],
+        "k-",
+        drawstyle="steps-post",
+        label="front",
+    )
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlabel="tangential stiffness [GPa/um]",
+        ylabel="conductance [W/(m^2 K)]",
+    )
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize="small", markerscale=4)
+    count = len(columns["valid"])
+    time = (
+        f"{count:,} candidates took {names['seconds']:.1f} s on the machine that drew the "
+        "picture, two parts with a hardness each."
+    )
+    return {"time": time}, {"docs/figures/design_front.svg": figure}
 
 
 def _draw_with_band(

@@ -11,7 +11,7 @@ from generate import height_coefficients
 from generate.__main__ import COMMANDS, main
 from generate.files import ROOT
 from generate.page import MARKED, fill, svg
-from generate.pages import export, library, maps, stability
+from generate.pages import export, library, maps, simulations, stability
 from mbma_tables import InputError, Surface, contact, theories
 
 SVG = b"<?xml"
@@ -176,3 +176,26 @@ def test_the_table_of_formats_is_that_of_their_declarations():
     text = (ROOT / "docs/export.md").read_text(encoding="utf-8")
     parts, _ = export.formats()
     assert fill(text, parts) == text
+
+
+@pytest.mark.slow
+def test_the_front_of_the_tutorial_has_all_joints_that_no_other_one_beats(capsys):
+    parts, files = simulations.design()
+    (axes,) = files["docs/figures/design_front.svg"].axes
+    *pairs, front = axes.lines
+    assert [line.get_label() for line in (*pairs, front)] == [
+        "stainless steel on itself",
+        "titanium on itself",
+        "stainless steel on titanium",
+        "steel on aluminium",
+        "front",
+    ]
+    stiffness, conductance = np.concatenate([line.get_data() for line in pairs], axis=1)
+    is_stiffer = stiffness > stiffness[:, None]
+    conducts_less = conductance < conductance[:, None]
+    is_beaten = (is_stiffer & conducts_less).any(axis=1)
+    expected = np.sort(stiffness[~is_beaten])
+    np.testing.assert_array_equal(np.sort(front.get_xdata()), expected)
+    time = float(re.search(r"10,000 candidates took (\S+) s", parts["time"])[1])
+    assert 0 < time < 60
+    assert f"{stiffness.size:,} valid candidates" in capsys.readouterr().out
