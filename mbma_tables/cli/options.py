@@ -427,8 +427,8 @@ def _named_values(texts: Sequence[str]) -> dict[str, Any]:
     return values
 
 
-class _IslandModel(click.Choice[str]):
-    """The name of an island model, or the file of a table."""
+class _NameOrTable(click.Choice[str]):
+    """The name of an island model or a theory, or the file of a table."""
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -452,7 +452,7 @@ _MODEL_OPTIONS = (
         "island_model",
         "Island model, by name or as the FILE.nc of a table.",
         default="universal",
-        type=_IslandModel(ISLAND_MODELS),
+        type=_NameOrTable(ISLAND_MODELS),
         **SHOWN,
     ),
     _option(
@@ -466,8 +466,8 @@ _MODEL_OPTIONS = (
 theory_option = _option(
     "theory",
     "Theory; only mbma has an island model, variant and rtol. Default: mbma for these and at a --separation, else "
-    "simulated for a map, calibrated for other surfaces.",
-    type=click.Choice([*THEORIES, *OF_MAPS]),
+    "simulated for a map, calibrated for other surfaces. Also the file of a table of totals.",
+    type=_NameOrTable([*THEORIES, *OF_MAPS]),
 )
 grid_option = _option(
     "grid",

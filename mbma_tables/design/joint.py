@@ -74,7 +74,7 @@ from mbma_tables.design.unknowns import OfOneMap, Unknowns, unknowns_of
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import TOPS
 from mbma_tables.surfaces.surface import Surface, assumptions
-from mbma_tables.theories import OF_MAPS, THEORIES, resolve, theory_text
+from mbma_tables.theories import OF_MAPS, THEORIES, is_table, resolve, theory_text
 from mbma_tables.theories.base import Theory
 
 if TYPE_CHECKING:
@@ -441,7 +441,9 @@ class Joint(JointQuantities, Displayed):
         checked_direction(self.direction, self.surface)
         if self.bodies.nu is not None:
             one_number("nu", tangential_ratio(self.bodies.nu, self.bodies.E))
-        if isinstance(self.theory, str):
+        if is_table(self.theory):
+            resolve(self.theory)
+        elif isinstance(self.theory, str):
             require_name("theory", self.theory, (*THEORIES, *OF_MAPS))
             surface: Any = self.surface
             points = getattr(surface, "map", None), getattr(surface, "table", None)

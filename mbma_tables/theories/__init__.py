@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from mbma_tables.theories.persson import Method, Persson
     from mbma_tables.theories.simulated.one_map import BoundaryElements
     from mbma_tables.theories.simulated.theory import Simulated
+    from mbma_tables.theories.tabulated import Tabulated
 
 __all__ = [
     "THEORIES",
@@ -33,6 +34,7 @@ __all__ = [
     "Method",
     "Persson",
     "Simulated",
+    "Tabulated",
     "Theory",
     "TheoryAnswer",
     "UserTheory",
@@ -58,6 +60,7 @@ _HOMES = {
     "Variant": ".islands.variants",
     "Method": "persson",
     "BoundaryElements": "simulated.one_map",
+    "Tabulated": "tabulated",
     "Theory": "base",
     "TheoryAnswer": "base",
     "UserTheory": "base",
@@ -81,8 +84,8 @@ def resolve(
     Parameters
     ----------
     theory : str, theory or None
-        A name, an object, or None for that of `default_name`. An object is one of this
-        package's, or any with a `name` and an `answer`.
+        A name, the file of a table of totals (`Tabulated`), an object, or None for that of
+        `default_name`. An object is one of this package's, or any with a `name` and an `answer`.
     surface : Surface, optional
         For the default, and for "simulated" and `Simulated`, which are theories of one
         surface: the simulation of its map, kept for the last eight of them.
@@ -110,7 +113,9 @@ def resolve(
     chosen: Any = theory
     if chosen is None and surface is not None:
         chosen = default_name(surface, given_name, options)
-    if isinstance(chosen, str) and chosen in _NAMED:
+    if is_table(chosen):
+        chosen = __getattr__("Tabulated")(chosen)
+    elif isinstance(chosen, str) and chosen in _NAMED:
         chosen = _with_options(chosen, options) if options else _shipped(chosen)
     elif options:
         raise InputError(
@@ -134,6 +139,11 @@ def _refuse_batch_of_spectra(chosen: Theory, surface: Any) -> None:
             "two parts with different bands, one at a time: theory='calibrated' takes a batch "
             "of these"
         )
+
+
+def is_table(theory: Any) -> bool:
+    """Whether a theory is given by the file of a table of its totals."""
+    return isinstance(theory, str) and theory.endswith(".nc")
 
 
 @shared()

@@ -26,7 +26,14 @@ from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.tables.island4d import Island4dModel
 from mbma_tables.tables.universal import UniversalModel
-from mbma_tables.theories import OF_MAPS, THEORIES, default_name, options_of, resolve
+from mbma_tables.theories import (
+    OF_MAPS,
+    THEORIES,
+    default_name,
+    is_table,
+    options_of,
+    resolve,
+)
 from mbma_tables.theories.base import Theory
 from mbma_tables.theories.mbma.models import with_table
 
@@ -136,6 +143,8 @@ class Problem:
             vars(self).update(island_model=with_table(self.island_model))
         if self.theory is None:
             vars(self).update(theory=self._default_theory())
+        elif is_table(self.theory):
+            vars(self).update(theory=resolve(self.theory))
         self._take_options_of_theory()
         self._set_tolerance()
         whole_number_in("points", self.points, 2, 10_000)
