@@ -113,10 +113,10 @@ def resolve(
     chosen: Any = theory
     if chosen is None and surface is not None:
         chosen = default_name(surface, given_name, options)
-    if is_table(chosen):
-        chosen = __getattr__("Tabulated")(chosen)
-    elif isinstance(chosen, str) and chosen in _NAMED:
+    if isinstance(chosen, str) and chosen in _NAMED:
         chosen = _with_options(chosen, options) if options else _shipped(chosen)
+    elif is_table(chosen) and not options:
+        chosen = __getattr__("Tabulated")(chosen)
     elif options:
         raise InputError(
             f"{', '.join(options)}: options of a theory given by its name, got {chosen!r}"
