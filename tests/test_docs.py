@@ -268,13 +268,24 @@ def test_page_of_tables_names_what_files_hold():
                 n for variable in dataset.variables.values() for n in variable.ncattrs()
             }
         assert f"{FORMAT_VERSIONS[kind]} of `{kind}.nc`" in TABLES
+    # what stands above is about lookups by the library
+    of_files = TABLES[TABLES.index("## Transforms of the axes") :]
     # f stands for F or A
-    words = re.findall(r"`([a-z]+[0-9]*(?:_[a-zA-Z0-9]+)+)`", TABLES)
+    words = re.findall(r"`([a-z]+[0-9]*(?:_[a-zA-Z0-9]+)+)`", of_files)
     quoted = {re.sub(r"_f(?=_|$)", "_F", word) for word in words}
     # words of the library, of formulas and of the surface, not of a file
     quoted -= {"mbma_tables", "zeta_d", "zeta_1", "h_d", "g_F", "g_A"}
     assert len(quoted) > 15
     assert quoted <= names
+
+
+def test_the_index_begins_with_the_commands_of_the_readme():
+    """Those are replayed by tests/tables/test_readme_table.py."""
+    pattern = re.compile(r"^```\w+\n.*?^```\n", re.DOTALL | re.MULTILINE)
+    section = README[README.index("## A table of your own") :]
+    # the page is read where the library is installed
+    blocks = [text.replace(".venv/bin/", "") for text in pattern.findall(section)[:2]]
+    assert pattern.findall(PAGES["index.md"])[:2] == blocks
 
 
 def test_readme_shows_results():

@@ -370,7 +370,7 @@ def test_the_example_prints_what_its_page_shows(capsys):
     example = runpy.run_path(str(ROOT / "examples" / "own_island_model.py"))
     example["main"]([], standalone_mode=False)
     shown = capsys.readouterr().out.splitlines()
-    page = (ROOT / "docs" / "lookup.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "tables.md").read_text(encoding="utf-8")
     assert len(shown) == 8
     # bounds in the last digit apart, as from one machine to another
     assert all(f"    {line}" in page for line in shown if "states" not in line)
