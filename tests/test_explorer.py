@@ -13,18 +13,15 @@ from helpers import compiled_law, contact_of, random_map, refused, run
 
 from generate.explorer import c_sources, digest_of, law_sources
 from mbma_tables import Bodies, InputError, Surface, contact
+from mbma_tables.common.units import Units
+from mbma_tables.contacts.quantities import registry
 from mbma_tables.export.code.languages.javascript import LAW_MODULE
 from mbma_tables.export.page.explorer import MODULE, explorer_page
 from mbma_tables.export.text import page_file
 from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma.sums import by_table
 
-QUANTITIES = {
-    "gap": "mean_separation",
-    "pressure": "pressure",
-    "area": "area",
-    "stiffness": "stiffness",
-}
+QUANTITIES = ("mean_separation", "pressure", "area", "stiffness")
 NAMES = ("hurst", "q0", "q1", "h_rms", "h_max")
 GO = """(text) => new Promise((done) => {
   addEventListener("hashchange", () => setTimeout(done), { once: true });
@@ -124,14 +121,11 @@ def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -
     surface = Surface(*(state[name] for name in NAMES))
     worst = 0.0
     for theory in ("mbma", "calibrated", "persson"):
-        known = {
-            name: found[f"{theory} {name}"]
-            for name in ("gap", "pressure", "area", "stiffness")
-        }
-        answered = np.flatnonzero(np.isfinite(known["gap"]))[rows]
+        known = {name: found[f"{theory} {name}"] for name in QUANTITIES}
+        answered = np.flatnonzero(np.isfinite(known["mean_separation"]))[rows]
         assert answered.size > 3
         options = {
-            "mean_separation": known["gap"][answered],
+            "mean_separation": known["mean_separation"][answered],
             "E_star": state["E_star"],
             "theory": theory,
         }
@@ -180,10 +174,10 @@ def largest_difference(state: dict, found: dict[str, np.ndarray], rows: slice) -
             50 / 1e-3 / state["E_star"] * found[f"{theory} stiffness"]
         )  # of 50 W/(m K), lengths in mm
         np.testing.assert_allclose(
-            found[f"{theory} conductance"], conductance, rtol=1e-12
+            found[f"{theory} solid_conductance"], conductance, rtol=1e-12
         )
         np.testing.assert_allclose(
-            found[f"{theory} tangential"],
+            found[f"{theory} tangential_stiffness"],
             found[f"{theory} stiffness"] * 1.4 / 1.7,
             rtol=1e-12,
         )
@@ -255,7 +249,9 @@ def test_a_slider_moves_curves_and_address_and_a_link_brings_them_back(visit):
     )
     moved = columns(tab)
     assert tab.input_value("#h_max") == "1.74338"
-    assert (moved["calibrated gap"] > before["calibrated gap"]).all()
+    assert (
+        moved["calibrated mean_separation"] > before["calibrated mean_separation"]
+    ).all()
     tab.wait_for_timeout(400)
     state = tab.evaluate("location.hash").lstrip("#")
     assert dict(urllib.parse.parse_qsl(state))["h_max"] == "1.74338"
@@ -314,7 +310,7 @@ def test_a_hardness_is_that_of_the_library(visit, against, hardness):
         ),
     )
     found = columns(tab)
-    gap = found["calibrated gap"]
+    gap = found["calibrated mean_separation"]
     seen = np.isfinite(gap) & np.isfinite(found["calibrated area"])
     assert seen.sum() > 20
     known = contact(
@@ -328,8 +324,8 @@ def test_a_hardness_is_that_of_the_library(visit, against, hardness):
         "area": known.area,
         "stiffness": known.stiffness,
     }
-    expected |= {"conductance": 50 / 1e-3 / 13.3 * known.unloading_stiffness}
-    expected |= {"tangential": known.tangential_stiffness}
+    expected |= {"solid_conductance": 50 / 1e-3 / 13.3 * known.unloading_stiffness}
+    expected |= {"tangential_stiffness": known.tangential_stiffness}
     for name, values in expected.items():
         np.testing.assert_allclose(
             found[f"calibrated {name}"][seen], values, rtol=1e-5, err_msg=name
@@ -362,12 +358,15 @@ def test_a_pasted_spectrum_is_answered_as_the_library_does(visit):
     surface = Surface.from_spectrum(SAMPLES, SPECTRUM, h_max=1.1)
     for theory in ("calibrated", "persson"):
         expected = contact(
-            surface, 13.3, mean_separation=found[f"{theory} gap"], theory=theory
+            surface,
+            13.3,
+            mean_separation=found[f"{theory} mean_separation"],
+            theory=theory,
         )
-        for name, attribute in QUANTITIES.items():
+        for name in QUANTITIES:
             # the library's own law of a spectrum is within 1e-7
             np.testing.assert_allclose(
-                found[f"{theory} {name}"], getattr(expected, attribute), rtol=1e-7
+                found[f"{theory} {name}"], getattr(expected, name), rtol=1e-7
             )
     # in SurfaceTopography's convention
     tab.fill("#spectrum", rows(SAMPLES, 4 * np.pi**2 * SPECTRUM))
@@ -499,3 +498,19 @@ def test_on_a_phone_and_in_the_dark(visit, tmp_path):
     picture = image.imread(tmp_path / "dark.png")[..., :3]
     assert np.median(picture) < 0.2
     assert (picture.max(axis=-1) > 0.6).mean() > 0.005
+
+
+def test_titles_and_units_are_those_of_the_declarations(visit):
+    """The page had names, titles and units of its own: "tangential", "thermal conductance"."""
+    tab = visit()
+    heads = tab.locator("#readout thead th").all()
+    said = {
+        cell.inner_text().partition(" [")[0].strip().replace(" ", "_"): cell
+        for cell in heads[1:-1]
+    }
+    assert {"pressure", "solid_conductance", "tangential_stiffness"} <= set(said)
+    for name, cell in said.items():
+        declared = registry.get(name)
+        assert cell.get_attribute("title") == declared.meaning
+        unit = declared.unit_in(Units("mm", "MPa"))
+        assert (f"[{unit}]" in cell.inner_text()) == (unit != "1")

@@ -2,39 +2,35 @@
 
 const STRESS_LABEL = OVER_E ? "E*" : (STRESS ?? "stress"),
   LENGTH_LABEL = LENGTH ?? "length";
-const UNITS = {
-  gap: LENGTH_LABEL,
-  pressure: STRESS_LABEL,
-  area: "",
-  stiffness: `${STRESS_LABEL}/${LENGTH_LABEL}`,
-  tangential: `${STRESS_LABEL}/${LENGTH_LABEL}`,
-  conductance: METRE ? "W/(m² K)" : `k_s/${LENGTH_LABEL}`,
-};
-const TITLES = {
-  gap: "mean separation u",
-  pressure: "pressure F/A0",
-  area: "contact area A/A0",
-  stiffness: "stiffness −dF/du",
-  tangential: "tangential stiffness before slip",
-  conductance: "thermal conductance",
-};
-const withUnit = (name) => TITLES[name] + (UNITS[name] ? `  [${UNITS[name]}]` : "");
+// The unit of a quantity, declared beside a "stress" and a "length".
+function unitOf(name) {
+  if (name === "solid_conductance" && !METRE) return `k_s/${LENGTH_LABEL}`;
+  const unit = DATA.quantities[name].unit;
+  return unit === "1" ? "" : unit.replace("stress", STRESS_LABEL).replace("length", LENGTH_LABEL);
+}
+const UNITS = Object.fromEntries(QUANTITIES.map((name) => [name, unitOf(name)]));
+const titleOf = (name) => name.replaceAll("_", " ");
+const withUnit = (name) => titleOf(name) + (UNITS[name] ? `  [${UNITS[name]}]` : "");
+const abscissaOf = (state) => (state.against === "gap" ? "mean_separation" : "pressure");
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 const charts = new Map();
 let drawn = null,
   cursor = null; // the curves in the pictures; the place under the cursor
 
+// What has the scatter of a logarithm, by the uncertainty of a declaration; others follow the stiffness.
+const OF_UNCERTAINTY = { scatter: "pressure", separation_scatter: "pressure", area_scatter: "area" };
+
 // One standard deviation to either side of a quantity, where its scatter is stated: of the pressure at equal separation,
 // of the rest at equal pressure.
 function band(state, curve, name) {
   const byGap = state.against === "gap",
-    scatter = curve.scatter[{ pressure: "pressure", gap: "pressure", area: "area" }[name] ?? "stiffness"];
+    scatter = curve.scatter[OF_UNCERTAINTY[DATA.quantities[name].uncertainty] ?? "stiffness"];
   if (byGap !== (name === "pressure")) return null;
   const side = (sign) =>
     curve[name].map((value, k) => {
       if (value === null || scatter[k] === null) return null;
       // a separation differs by what the pressure does over the stiffness
-      return name === "gap"
+      return name === "mean_separation"
         ? Math.max(value + (sign * scatter[k] * curve.pressure[k]) / curve.stiffness[k], 0)
         : value * Math.exp(sign * scatter[k]);
     });
@@ -50,7 +46,7 @@ function rangeOf(log) {
 }
 
 function chartFor(name, state, theories, hasBand) {
-  const log = state.log === "yes" && name !== "gap",
+  const log = state.log === "yes" && name !== "mean_separation",
     logX = state.against === "pressure";
   const axis = (label, logarithmic) => ({
     label,
@@ -79,7 +75,7 @@ function chartFor(name, state, theories, hasBand) {
         x: { time: false, distr: logX ? 3 : 1, range: (_, low, high) => [low ?? 0.1, high ?? 1] },
         y: { distr: log ? 3 : 1, range: rangeOf(log) },
       },
-      axes: [axis(withUnit(logX ? "pressure" : "gap"), logX), axis("", log)],
+      axes: [axis(withUnit(logX ? "pressure" : "mean_separation"), logX), axis("", log)],
       series: [
         {},
         ...theories.map((theory, k) => ({
@@ -138,7 +134,7 @@ function tickTexts(own, splits) {
 function draw(state, found) {
   drawn = found;
   const theories = found.curves.map(({ theory }) => theory);
-  const names = [state.against === "gap" ? "pressure" : "gap", "conductance", "area", "stiffness", "tangential"];
+  const names = QUANTITIES.filter((name) => name !== abscissaOf(state));
   for (const [name, { chart, element }] of charts) {
     if (!names.includes(name)) {
       chart.destroy();
@@ -173,7 +169,7 @@ function draw(state, found) {
 function read(k) {
   cursor = k;
   const byGap = drawn.state.against === "gap",
-    names = QUANTITIES.filter((name) => name !== (byGap ? "gap" : "pressure"));
+    names = QUANTITIES.filter((name) => name !== abscissaOf(drawn.state));
   const cell = (kind, text, title) =>
     Object.assign(document.createElement(kind), { textContent: text, title: title ?? "" });
   const row = (...cells) => {
@@ -182,8 +178,8 @@ function read(k) {
     return made;
   };
   const head = row(
-    cell("th", `${byGap ? "u" : "p"} = ${shown(drawn.x[k], 5)} ${UNITS[byGap ? "gap" : "pressure"]}`),
-    ...names.map((name) => cell("th", withUnit(name))),
+    cell("th", `${byGap ? "u" : "p"} = ${shown(drawn.x[k], 5)} ${UNITS[abscissaOf(drawn.state)]}`),
+    ...names.map((name) => cell("th", withUnit(name), DATA.quantities[name].meaning)),
     cell("th", "valid"),
   );
   const rows = drawn.curves.map((curve) => {
@@ -194,7 +190,7 @@ function read(k) {
     const texts = names.map((name) => {
       const sides = curve === drawn.curves[0] ? band(drawn.state, curve, name) : null;
       const scatter = sides?.[0][k]
-        ? ` ± ${shown(name === "gap" ? sides[0][k] - curve.gap[k] : 100 * Math.log(sides[0][k] / curve[name][k]), 2)}${name === "gap" ? "" : "%"}`
+        ? ` ± ${shown(name === "mean_separation" ? sides[0][k] - curve.mean_separation[k] : 100 * Math.log(sides[0][k] / curve[name][k]), 2)}${name === "mean_separation" ? "" : "%"}`
         : "";
       return cell("td", shown(curve[name][k], 5) + scatter);
     });

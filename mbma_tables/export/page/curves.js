@@ -4,7 +4,17 @@ const GAPS = 100,
   PRESSURES = 100;
 const LIGHTEST = 1e-5,
   HEAVIEST = 1; // pressures drawn, over E* times the rms gradient
-const QUANTITIES = ["gap", "pressure", "area", "stiffness", "tangential", "conductance"];
+// Quantities of the library by the answer of a theory; titles and units are those of their declarations.
+const OF_ANSWER = {
+  mean_separation: ({ u }) => u,
+  pressure: ({ force }) => force,
+  area: ({ area }) => area,
+  stiffness: ({ stiffness }) => stiffness,
+  // (2 - nu)/(2 (1 - nu)) is normal over tangential stiffness
+  tangential_stiffness: ({ unloading }, { nu }) => (unloading * 2 * (1 - nu)) / (2 - nu),
+  solid_conductance: ({ unloading }, { k_s, E_star }) => ((k_s / E_star) * unloading) / (METRE ?? 1),
+};
+const QUANTITIES = Object.keys(OF_ANSWER);
 const NAMES = { mbma: "MBMA", calibrated: "calibrated", persson: "Persson" };
 
 function curvesOf(state) {
@@ -24,8 +34,7 @@ function curvesOf(state) {
         { length: PRESSURES },
         (_, k) => scale * LIGHTEST * (HEAVIEST / LIGHTEST) ** (k / (PRESSURES - 1)),
       );
-  const yields = Number.isFinite(state.hardness),
-    kappa = (2 - state.nu) / (2 * (1 - state.nu)); // normal over tangential stiffness
+  const yields = Number.isFinite(state.hardness);
   const curves = theories.map((theory) => {
     const at = yields && theory !== "persson" ? yielding(model, theory, state, h_rms, gradient) : model[theory],
       refused = yields && theory === "persson";
@@ -39,11 +48,8 @@ function curvesOf(state) {
         curve.silence[k] = refused ? "with a hardness it is in the Python library" : u > 0 ? model.why() : "it does not reach such a pressure";
         return;
       }
-      const { force, area, stiffness, unloading = stiffness } = found,
-        conductance = ((state.k_s / state.E_star) * unloading) / (METRE ?? 1);
-      Object.entries({ gap: u, pressure: force, area, stiffness, tangential: unloading / kappa, conductance }).forEach(
-        ([name, number]) => (curve[name][k] = number),
-      );
+      const answer = { unloading: found.stiffness, ...found, u };
+      for (const [name, of] of Object.entries(OF_ANSWER)) curve[name][k] = of(answer, state);
     });
     curve.scatter = scatterOf(state, curve);
     curve.concerns = concernsOf(state, curve, h_rms, gradient);
@@ -160,9 +166,9 @@ function concernsOf(state, curve, h_rms, gradient) {
       `areas of islands are added, A/A0 is above ${LIMITS.mbma_area}`,
       (k) => !DATA.model.variants[state.variant].cover && curve.area[k] > LIMITS.mbma_area,
     ]);
-    reasons.push(["stiffness falls with compression here, which no simulation shows", (k) => curve.gap[k] < gap]);
+    reasons.push(["stiffness falls with compression here, which no simulation shows", (k) => curve.mean_separation[k] < gap]);
   } else if (curve.theory === "persson") {
-    reasons.push(["u is above h_max, where the surface has no contact", (k) => curve.gap[k] > state.h_max]);
+    reasons.push(["u is above h_max, where the surface has no contact", (k) => curve.mean_separation[k] > state.h_max]);
   }
   untestedSurface(state, h_rms).forEach(([text, holds]) => reasons.push([text, always(holds)]));
   reasons.push([`A/A0 is below ${low}`, (k) => curve.area[k] > 0 && curve.area[k] < low]);
@@ -172,7 +178,7 @@ function concernsOf(state, curve, h_rms, gradient) {
 
 // The separation of the first local maximum of stiffness under compression, by the drawn points.
 function softening(curve) {
-  const points = curve.gap
+  const points = curve.mean_separation
     .map((gap, k) => [gap, curve.stiffness[k]])
     .filter(([gap]) => gap !== null)
     .sort((a, b) => b[0] - a[0]);

@@ -19,6 +19,7 @@ from mbma_tables.bodies.materials import hardness_in
 from mbma_tables.common.arguments import number_in, positive_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, factor
+from mbma_tables.contacts.quantities.registry import registry
 from mbma_tables.contacts.quantities.validity import MAX_GRADIENT
 from mbma_tables.export.model import c_code
 from mbma_tables.export.text import page_file
@@ -92,6 +93,19 @@ def _limits() -> dict[str, Any]:
         "area": ranges["area"],
         "max_samples": MAX_SAMPLES,
         "hardness": dataclasses.asdict(hardness_law.CONSTANTS),
+    }
+
+
+def _declarations() -> dict[str, dict[str, str | None]]:
+    """What the page says of quantities, of which it shows those that it computes."""
+    without_names = Units(None, None)
+    return {
+        name: {
+            "meaning": declared.meaning,
+            "unit": declared.unit_in(without_names),
+            "uncertainty": declared.uncertainty,
+        }
+        for name, declared in registry().items()
     }
 
 
@@ -186,6 +200,7 @@ def explorer_page(
         "note": MAP_NOTE
         if isinstance(surface, MeasuredSurface) and surface.bearing is not None
         else "",
+        "quantities": _declarations(),
         "limits": _limits(),
         "model": {
             "module": base64.b64encode(page_file(MODULE)).decode("ascii"),
