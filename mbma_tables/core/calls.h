@@ -886,6 +886,24 @@ static bool do_spectra_separation(const argument *a, long long *answer) {
     return true;
 }
 
+static bool do_gap_flow(const argument *a, long long *answer) {
+    enum { ALPHA, LAWS, CONSTANTS, INNER_AT };
+    enum { FLOW = INNER_AT + INNER_ARGUMENTS, RULE, OWNER, LOAD, FACTOR };
+    const size_t surfaces = a[ALPHA].count;
+    if (surfaces == 0 || !is_inner(&a[INNER_AT]))
+        return false;
+    const size_t parts = a[LAWS].count / surfaces / MBMA_PART_NUMBERS;
+    if (a[LAWS].count != surfaces * parts * MBMA_PART_NUMBERS || parts > MBMA_MOST_PARTS ||
+        a[RULE].count != 2 * MBMA_FLOW_NODES)
+        return false;
+    const mbma_inner inner = inner_of(&a[INNER_AT]);
+    *answer = (long long)mbma_gap_flow(surfaces, parts, a[LAWS].items, a[ALPHA].items,
+                                       a[CONSTANTS].items, &inner, a[FLOW].items, a[RULE].items,
+                                       a[OWNER].count, a[OWNER].items, a[LOAD].items,
+                                       a[FACTOR].items);
+    return true;
+}
+
 /* ---- all functions ---- */
 
 /* Names of the functions `do_...`, which return whether the sizes and numbers of their arguments
@@ -935,6 +953,7 @@ static bool do_spectra_separation(const argument *a, long long *answer) {
     FN(most_wave_words, "") \
     FN(spectra_of, "Dn Dn D D7 " INNER "w w") \
     FN(spectra_contact, SPECTRA "Ln Dn wn wn wn") \
-    FN(spectra_separation, SPECTRA "Ln Dn wn")
+    FN(spectra_separation, SPECTRA "Ln Dn wn") \
+    FN(gap_flow, "D D D7 " INNER "D2 D Ln Dn wn")
 
 #endif

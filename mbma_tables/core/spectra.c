@@ -1,17 +1,13 @@
 /* Sums over wavenumbers of many spectra; `spectra.h` has what they are, `spectrum_laws.c` the
  * theory.
  */
-#include "spectra.h"
-#include "elementary.h"
+#include "spectrum_sums.h"
 
-enum { TERMS = MBMA_INNER_TERMS, MOST_CELLS = MBMA_MOST_INNER_CELLS, MOST_STEPS = 60, LANES = 8, NODES = 8, CHUNK = MBMA_WAVE_CHUNK };
+enum { NODES = 8 };
 
-#define HEAVIEST 2.95         /* ln F from which u is below 1e-317 */
-#define CLOSE 1e-8            /* of ln F: the next error would be about the square of this one */
-#define NO_FORCE -1e300       /* ln F */
 #define FARTHEST 1e80         /* u at which there is no force */
 #define FINEST (1.0 / 256.0)  /* panel of ln g at the shortest waves, which carry heavy loads */
-#define WIDEST 0.8 /* panel of ln g */
+#define WIDEST 0.8            /* panel of ln g */
 #define BEGINNING 2e-18       /* part of a spectrum's width in which g rises to 1e-9 */
 #define DEEP 0.05             /* g, below which few nodes suffice where shares of u are small */
 #define MOST_CHANGE 6.0       /* of ln of the spectrum in a panel */
@@ -40,18 +36,6 @@ static const gauss_rule RULES[] = {
      {0.1012285362903763, 0.2223810344533745, 0.3137066458778873, 0.362683783378362,
       0.362683783378362, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763}}};
 
-/* A part in ln(q/q0): where it begins and ends, C q^2 where it begins, and the power of C q^2. */
-typedef struct {
-    double start, end, content, power;
-} part;
-
-/* A spectrum as parts, and the places where one begins or ends. */
-typedef struct {
-    size_t count, edges;
-    part parts[MBMA_MOST_PARTS];
-    double edge[2 * MBMA_MOST_PARTS];
-} sum_of_parts;
-
 /* The parts between two of these places, from a place t on: C q^2 there and its power. */
 typedef struct {
     size_t count;
@@ -75,55 +59,12 @@ static local_parts parts_from(const sum_of_parts *s, size_t segment, double t) {
     return found;
 }
 
-/* (exp(x) - 1)/x */
-MBMA_INLINE double growth(double x) {
-    const double safe = fabs(x) > 1e-30 ? x : 1e-30;
-    return mbma_expm1(safe) / safe;
-}
-
 /* Integral of C q^(order + 1) dq over a width. */
 static double integral(const local_parts *here, int order, double width) {
     double sum = 0.0;
     for (size_t k = 0; k < here->count; k++)
         sum += here->content[k] * growth((here->power[k] + order) * width);
     return sum * width * mbma_exp(order * here->t);
-}
-
-static void insert(double x, size_t *count, double *sorted) {
-    size_t k = *count;
-    for (size_t other = 0; other < *count; other++)
-        if (fabs(sorted[other] - x) <= 1e-14 * (1.0 + fabs(x)))
-            return;
-    for (; k > 0 && sorted[k - 1] > x; k--)
-        sorted[k] = sorted[k - 1];
-    sorted[k] = x;
-    ++*count;
-}
-
-/* Parts of one surface; false where they are no spectrum. */
-static bool read_parts(size_t count, const double *laws, sum_of_parts *s) {
-    double q0 = INFINITY, largest = 0.0;
-    s->count = s->edges = 0;
-    for (size_t k = 0; k < count; k++) {
-        const double *const p = laws + MBMA_PART_NUMBERS * k;
-        if (!(p[0] > 0.0 && p[1] < INFINITY && p[2] >= 0.0 && p[2] < INFINITY && p[3] == p[3]))
-            return false;
-        if (p[2] > 0.0 && p[1] > p[0]) {
-            q0 = mbma_min(q0, p[0]);
-            largest = mbma_max(largest, p[2] * p[0] * p[0]);
-        }
-    }
-    for (size_t k = 0; k < count; k++) {
-        const double *const p = laws + MBMA_PART_NUMBERS * k;
-        if (!(p[2] > 0.0 && p[1] > p[0]))
-            continue;
-        const part own = {log(p[0] / q0), log(p[1] / q0), p[2] * p[0] * p[0] / largest,
-                          p[3] + 2.0};
-        s->parts[s->count++] = own;
-        insert(own.start, &s->edges, s->edge);
-        insert(own.end, &s->edges, s->edge);
-    }
-    return s->count > 0;
 }
 
 /* Moments 0, 2 and 4 but for a common factor. */
@@ -245,80 +186,7 @@ static bool fill_waves(const sum_of_parts *s, const double moments[3], wave_list
     return list->count > 0;
 }
 
-/* ---- sums ---- */
-
-/* A surface that entries are computed of. */
-typedef struct {
-    const mbma_inner *inner;
-    const mbma_spectrum_numbers *numbers;
-    const double *place, *fall, *share;
-    size_t count;
-    double p[MOST_CELLS * TERMS];
-} own_sum;
-
-static void open_sum(own_sum *s, const mbma_inner *inner, const mbma_spectrum_numbers *numbers,
-                     const double *waves) {
-    const double less = numbers->narrowness - inner->narrowness;
-    s->inner = inner;
-    s->numbers = numbers;
-    s->count = (size_t)numbers->count;
-    s->place = waves + (size_t)numbers->first;
-    s->fall = s->place + s->count;
-    s->share = s->fall + s->count;
-    for (size_t k = 0; k < inner->cells * TERMS; k++)
-        s->p[k] = mbma_fma(less, inner->slopes[k], inner->polynomials[k]);
-}
-
-/* The inner integral of some wavenumbers at places among the cells, and its derivative by these. */
-static void inner_integrals(const own_sum *s, const double *restrict place, double from,
-                            double *restrict value, double *restrict slope) {
-    const double *const restrict p = s->p;
-    const double last = (double)(s->inner->cells - 1);
-    int32_t word[CHUNK];
-    double t[CHUNK];
-    for (size_t k = 0; k < CHUNK; k++) {
-        const double at = mbma_min(from + place[k], last + 1.0);
-        const double cell = (double)(int32_t)mbma_held(at, 0.0, last);
-        word[k] = (int32_t)cell * TERMS;
-        t[k] = 2.0 * (at - cell) - 1.0;
-    }
-    for (size_t k = 0; k < CHUNK; k++) {
-        const double c0 = p[word[k]], c1 = p[word[k] + 1], c2 = p[word[k] + 2];
-        const double c3 = p[word[k] + 3], c4 = p[word[k] + 4], c5 = p[word[k] + 5];
-        slope[k] = 2.0 * mbma_horner(5.0 * c5, t[k], 4.0 * c4, 3.0 * c3, 2.0 * c2, c1);
-        value[k] = mbma_fma(mbma_horner(c5, t[k], c4, c3, c2, c1), t[k], c0);
-    }
-}
-
-/* Sums of eight lanes. */
-static double total_of(const double sum[LANES]) {
-    return ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]));
-}
-
-/* ln u of a surface without end, before the tail's factor, and its derivative by ln F. */
-static double log_u_of(const own_sum *s, double log_force, double *slope) {
-    const double square = 2.0 * mbma_exp(2.0 * log_force), rate = s->inner->rate;
-    double sum[LANES] = {0.0}, steep[LANES] = {0.0};
-    for (size_t begin = 0; begin < s->count; begin += CHUNK) {
-        const double *const fall = s->fall + begin, *const share = s->share + begin;
-        double value[CHUNK], by_place[CHUNK];
-        inner_integrals(s, s->place + begin, log_force * rate, value, by_place);
-        for (size_t k = 0; k < CHUNK; k++) {
-            const double factor = share[k] * mbma_exp(-square * fall[k]);
-            const double change = -2.0 * square * fall[k] * value[k];
-            by_place[k] = factor * mbma_fma(rate, by_place[k], change);
-            value[k] *= factor;
-        }
-        for (size_t k = 0; k < CHUNK; k += LANES)
-            for (size_t l = 0; l < LANES; l++) {
-                sum[l] += value[k + l];
-                steep[l] += by_place[k + l];
-            }
-    }
-    const double total = total_of(sum);
-    *slope = total_of(steep) / total - 2.0 * square;
-    return mbma_log(total) - square;
-}
+/* ---- contacts ---- */
 
 /* ln F at a mean separation before the tail's factor by Newton's method, and d ln u/d ln F. */
 static double log_force_at(const own_sum *s, double u, double *slope) {
@@ -340,9 +208,6 @@ static double log_force_at(const own_sum *s, double u, double *slope) {
     }
     return x;
 }
-
-/* Decrease of ln F by the tail's factor. */
-static double tail_at(const own_sum *s, double u) { return s->numbers->tail * u * u * u; }
 
 /* Numbers of a surface from its wavenumbers; `end` is still to be found. */
 static mbma_spectrum_numbers numbers_of(const wave_list *list, double first, double alpha,
@@ -460,23 +325,6 @@ size_t mbma_spectra_contact(const mbma_spectra *spectra, const mbma_inner *inner
     return bad;
 }
 
-/* Newton's method for ln F before the tail's factor, whose sum with that is `goal`. */
-static double separation_at(const own_sum *s, double goal) {
-    double low = -800.0, high = HEAVIEST, u = 0.0, slope;
-    double x = goal;
-    for (int step = 0; step < MOST_STEPS && goal < HEAVIEST; step++) {
-        u = exp(log_u_of(s, x, &slope));
-        const double miss = x - tail_at(s, u) - goal;
-        const double move = -miss / (1.0 - 3.0 * tail_at(s, u) * slope);
-        *(miss > 0.0 ? &high : &low) = x;
-        /* what is left is of second order */
-        if (fabs(move) <= 100.0 * CLOSE)
-            return u * exp(slope * move);
-        x = x + move > low && x + move < high ? x + move : 0.5 * (low + high);
-    }
-    return u;
-}
-
 size_t mbma_spectra_separation(const mbma_spectra *spectra, const mbma_inner *inner, size_t n,
                                const int64_t *owner, const double *force, double *u) {
     int64_t opened = -1;
@@ -484,10 +332,12 @@ size_t mbma_spectra_separation(const mbma_spectra *spectra, const mbma_inner *in
     own_sum own;
     for (size_t k = 0; k < n; k++) {
         const bool good = open_owner(spectra, inner, owner[k], &opened, &own) && force[k] > 0.0;
+        double taken = 0.0;
         u[k] = NAN;
-        if (good)
-            u[k] = mbma_min(separation_at(&own, mbma_endless(log(force[k]), own.numbers->end)),
-                            own.numbers->h_max);
+        if (good) {
+            const double goal = mbma_endless(log(force[k]), own.numbers->end);
+            u[k] = mbma_min(separation_at(&own, goal, 100.0 * CLOSE, &taken), own.numbers->h_max);
+        }
         bad += u[k] != u[k];
     }
     return bad;

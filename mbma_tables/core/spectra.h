@@ -59,4 +59,20 @@ size_t mbma_spectra_contact(const mbma_spectra *spectra, const mbma_inner *inner
 size_t mbma_spectra_separation(const mbma_spectra *spectra, const mbma_inner *inner, size_t n,
                                const int64_t *owner, const double *force, double *u);
 
+/* Of the flow: contact fraction from which gaps do not percolate, and the power of smaller ones by
+ * which contact obstructs. */
+typedef struct {
+    double threshold, obstruction;
+} mbma_flow_constants;
+
+enum { MBMA_FLOW_NODES = 32 };
+
+/* ln R of the gaps of surfaces at loads F over A0 E* g: their flow over that of gaps of the same
+ * mean without contact; -infinity where they do not percolate. `rule` has Gauss's nodes on [-1, 1]
+ * and their weights, MBMA_FLOW_NODES of each. */
+size_t mbma_gap_flow(size_t surfaces, size_t parts, const double *laws, const double *alpha,
+                     const mbma_law_constants *constants, const mbma_inner *inner,
+                     const mbma_flow_constants *flow, const double *rule, size_t n,
+                     const int64_t *owner, const double *load, double *factor);
+
 #endif

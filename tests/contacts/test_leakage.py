@@ -13,8 +13,10 @@ from hypothesis import strategies as st
 from mbma_tables import Bodies, Surface, contact, contact_law
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.contacts.quantities import effective_medium as leakage
+from mbma_tables.contacts.quantities import leakage as spectra_flow
 from mbma_tables.contacts.quantities.leakage import flow, flow_of_spectrum, shipped_flow
 from mbma_tables.theories.calibrated.formulas import Spectrum
+from mbma_tables.theories.calibrated.spectra import self_affine_laws
 from mbma_tables.theories.evidence import shipped_part
 
 SEAL = Surface(hurst=0.8, q0=0.01, q1=0.3, h_rms=1.0, h_max=3.5, unit="um")
@@ -397,3 +399,34 @@ def test_the_separation_at_which_gaps_block_is_a_mean_separation():
     assert law.area(u) == pytest.approx(0.41, abs=0.02)
     assert law.leakage(u * (1 - 1e-9)) == 0
     assert law.leakage(u * (1 + 1e-3)) > 0
+
+
+def test_flow_of_many_spectra_is_that_of_the_medium_of_each():
+    """Bands of the medium are integrals there and sums over a quadrature's nodes here: 2% at most."""
+    rng = np.random.default_rng(8)
+    flow = shipped_flow().constants
+    areas = np.array([1e-4, 0.01, 0.1, 0.3, 0.4])
+    odds = np.log(areas / (flow.threshold - areas))
+    for _ in range(6):
+        hurst, zeta = rng.uniform(0.05, 1.0), 10 ** rng.uniform(0.8, 4.0)
+        one = Spectrum.self_affine(hurst, zeta)
+        found = spectra_flow._log_factors(
+            self_affine_laws(np.array([hurst]), np.array([zeta])),
+            np.array([one.alpha]),
+            np.zeros(areas.size, np.int64),
+            odds,
+        )
+        wanted = leakage.contact_factor(one, areas, flow)
+        np.testing.assert_allclose(found[:2], wanted[:2], rtol=3e-3, atol=2e-4)
+        np.testing.assert_allclose(found, wanted, atol=0.02)
+    # against the certified table, to its error
+    table = shipped_flow()
+    H, zeta = rng.uniform(0.3, 0.95, 200), rng.uniform(8, 200, 200)
+    area = rng.uniform(0.003, 0.39, 200)
+    u = np.ones(200)
+    owner = np.arange(200)
+    by_table = table.flow(np.stack([H, np.log(zeta)]), owner, u, area)
+    alpha = Surface(H, 1.0, zeta, 1.0, 3.0).alpha
+    laws = self_affine_laws(H, zeta)
+    by_medium = spectra_flow._flow_of_spectra(laws, alpha, owner, u, area)
+    assert np.abs(np.log(by_medium / by_table)).max() < table.error

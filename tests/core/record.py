@@ -155,7 +155,8 @@ def use():
             contact(one, Bodies(hardness=cap), pressure=found.pressure, theory=theory)
     contact(many, mean_separation=1.0, theory="calibrated")
     # outside the calibrated table
-    contact(Surface(0.05, 1.0, 30.0, 1.0, 3.0), pressure=[0.01, 0.1], theory="calibrated")
+    beyond = Surface(0.05, 1.0, 30.0, 1.0, 3.0)
+    assert contact(beyond, pressure=[0.01, 0.1], theory="calibrated").leakage.K.all()
 
 
 if __name__ == "__main__":

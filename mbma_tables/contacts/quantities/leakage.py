@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from typing import Any
 
@@ -12,8 +13,8 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import (
     FloatArray,
     Numbers,
+    filled,
     finite_array,
-    grouped,
     is_labelled,
     positive_array,
     rows,
@@ -35,13 +36,19 @@ from mbma_tables.contacts.quantities.state import State
 from mbma_tables.contacts.quantities.validity import reasons_with_masks, valid_where_none
 from mbma_tables.core import core
 from mbma_tables.surfaces.any_surface import agree
-from mbma_tables.surfaces.banded import BandedSurface
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.base import Theory
 from mbma_tables.theories.calibrated.formulas import (
+    CONSTANTS,
     Spectrum,
-    self_affine_law,
+    force_at_area,
+    light_factor,
     spectrum_of,
+)
+from mbma_tables.theories.calibrated.spectra import (
+    inner_integral,
+    laws_of,
+    power_laws_of,
 )
 from mbma_tables.theories.evidence import (
     Owners,
@@ -59,6 +66,8 @@ COVERED = np.array(
 FEW = 8192  # entries per block, so that a block fits into the processor's cache
 LEAST = 1e-300  # smaller contact fractions count as zero
 OWN_NODES = 64  # contact fractions at which a spectrum's own factor is found
+FLOW_NODES = 32  # of gaps between two magnifications, in batches
+STEP = 0.25  # of odds, for a slope at the table's end
 KEPT = 64  # spectra whose factors are kept
 # standard deviations of ln k of maps by their isotropic spectrum, which come on top, of
 # maps that are valid for the calibrated law and of others; at these contacts of the data
@@ -463,17 +472,55 @@ def flow_of_spectrum(spectrum: Spectrum, u: FloatArray, area: FloatArray) -> Flo
     return _flow(own_factor(spectrum), np.zeros(u.size, np.int64), u, area)
 
 
-def _flow_of_bands(
-    surface: BandedSurface, u: FloatArray, area: FloatArray, shape: tuple[int, ...]
+def _flow_of_spectra(
+    laws: FloatArray, alpha: FloatArray, owner: Owners, u: FloatArray, area: FloatArray
 ) -> FloatArray:
-    """The same of a batch of spectra, one by one."""
-    number = np.arange(math.prod(surface.shape)).reshape(surface.shape)
-    owner = np.broadcast_to(number, shape).ravel()
-    out = np.empty(u.size)
-    for row, mine in grouped(owner):
-        one = surface.entry(tuple(map(int, np.unravel_index(row, surface.shape))))
-        out[mine] = flow_of_spectrum(spectrum_of(one), u[mine], area[mine])
-    return out
+    """k of mean gaps [h_rms] and contact fractions of many spectra, of the medium itself.
+
+    Below and above the table's odds as of `_flow`.
+    """
+    table = shipped_flow()
+    flow = table.constants
+    with np.errstate(divide="ignore", invalid="ignore"):
+        touching = np.maximum(area, LEAST)
+        odds = np.log(touching / np.maximum(flow.threshold - area, LEAST))
+    first, last = table.first[2], table.last
+    inside = np.clip(odds, first, last)
+    value = _log_factors(laws, alpha, owner, inside)
+    near = np.flatnonzero((odds > last) & (area < flow.threshold))
+    if near.size:
+        before = np.full(near.size, last - STEP)
+        slope = (value[near] - _log_factors(laws, alpha, owner[near], before)) / STEP
+        value[near] += slope * (odds[near] - last)
+    value = value * np.exp(flow.obstruction * np.minimum(odds - first, 0.0))
+    wide = u * u * u * wide_gap(u) * np.exp(np.minimum(value, 0.0))
+    return np.where(np.isnan(u), np.nan, np.where(area < flow.threshold, wide, 0.0))
+
+
+def _log_factors(
+    laws: FloatArray, alpha: FloatArray, owner: Owners, odds: FloatArray
+) -> FloatArray:
+    """ln R at the table's odds of contact."""
+    flow = shipped_flow().constants
+    contact = flow.threshold / (1 + np.exp(-odds))
+    load = force_at_area(contact, light_factor(alpha)[owner])
+    given = (
+        np.ascontiguousarray(alpha, float),
+        np.ascontiguousarray(laws, float).ravel(),
+        np.array(dataclasses.astuple(CONSTANTS)),
+        *inner_integral(CONSTANTS),
+        np.array([flow.threshold, flow.obstruction]),
+        np.concatenate(_rule()),
+    )
+    fill = functools.partial(core.gap_flow, *given)
+    found: FloatArray = filled(fill, (np.ascontiguousarray(owner), load), 1)[0]
+    return found
+
+
+@shared()
+def _rule() -> tuple[FloatArray, FloatArray]:
+    """Gauss's nodes and weights of gaps between two magnifications."""
+    return np.polynomial.legendre.leggauss(FLOW_NODES)
 
 
 def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatArray:
@@ -483,17 +530,20 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
     )
     if isinstance(surface, MeasuredSurface):
         return flow_of_spectrum(spectrum_of(surface), u, contact).reshape(shape)
-    if isinstance(surface, BandedSurface):
-        return _flow_of_bands(surface, u, contact, shape).reshape(shape)
-    table = shipped_flow()
-    given = np.stack([np.ravel(surface.hurst), np.log(np.ravel(surface.zeta_1))])
-    number = np.arange(given.shape[1]).reshape(surface.shape)
+    number = np.arange(math.prod(surface.shape)).reshape(surface.shape)
     owner = np.ascontiguousarray(np.broadcast_to(number, shape)).ravel()
+    alpha = np.ravel(surface.alpha)
+    hurst, zeta_1, is_self_affine = power_laws_of(surface)
+    table = shipped_flow()
+    given = np.stack([hurst, np.log(zeta_1)])
     out = table.flow(given, owner, u, contact)
-    for row in np.flatnonzero(~table.covers(*given)):
-        mine = owner == row
-        law = self_affine_law(float(given[0, row]), float(np.exp(given[1, row])), None)
-        out[mine] = flow_of_spectrum(law.spectrum, u[mine], contact[mine])
+    by_table = table.covers(*given) & is_self_affine
+    if not by_table.all():
+        laws = laws_of(surface)
+        others = np.flatnonzero(~by_table[owner])
+        out[others] = _flow_of_spectra(
+            laws, alpha, owner[others], u[others], contact[others]
+        )
     return out.reshape(shape)
 
 

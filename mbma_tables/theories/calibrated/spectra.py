@@ -11,12 +11,14 @@ import functools
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray, filled
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.shared import shared
 from mbma_tables.core import core
 from mbma_tables.surfaces.banded import BandedSurface
+from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.calibrated.formulas import (
     CONSTANTS,
     NARROWNESS,
@@ -138,8 +140,22 @@ class Spectra:
         return self._answers(core.spectra_separation, columns, 1)
 
 
-def laws_of(surface: BandedSurface) -> FloatArray:
-    """`laws` of a batch of spectra."""
+def power_laws_of(
+    surface: Surface | BandedSurface,
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Hurst exponents and zeta_1, flat, of surfaces that are self-affine, and which these are."""
+    if isinstance(surface, BandedSurface):
+        hurst, zeta_1, is_one = (np.ravel(each) for each in surface.power_laws)
+        return hurst, zeta_1, is_one.astype(bool)
+    numbers = surface.hurst, surface.zeta_1
+    hurst, zeta_1 = (np.asarray(each, float).ravel() for each in numbers)
+    return hurst, zeta_1, np.ones(hurst.size, bool)
+
+
+def laws_of(surface: Surface | BandedSurface) -> FloatArray:
+    """`laws` of a batch."""
+    if not isinstance(surface, BandedSurface):
+        return self_affine_laws(*power_laws_of(surface)[:2])
     bands = [np.stack(np.broadcast_arrays(*band), axis=-1) for band in surface.bands]
     return np.stack(bands, axis=-2).reshape(-1, len(bands), 4)
 

@@ -31,7 +31,7 @@ from mbma_tables.theories.calibrated.formulas import area as law_area
 from mbma_tables.theories.calibrated.spectra import (
     Spectra,
     laws_of,
-    self_affine_laws,
+    power_laws_of,
 )
 from mbma_tables.theories.evidence import NAME, shipped_checksum, shipped_deviations
 from mbma_tables.theories.inversion import Curve
@@ -72,18 +72,6 @@ def _error(stated: Any, nearer: float, share: FloatArray) -> FloatArray:
     return error
 
 
-def _power_laws(
-    surface: Surface | BandedSurface,
-) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Hurst exponents and zeta_1, flat, of surfaces that are self-affine, and which these are."""
-    if isinstance(surface, BandedSurface):
-        hurst, zeta_1, is_one = (np.ravel(each) for each in surface.power_laws)
-        return hurst, zeta_1, is_one.astype(bool)
-    numbers = surface.hurst, surface.zeta_1
-    hurst, zeta_1 = (np.asarray(each, float).ravel() for each in numbers)
-    return hurst, zeta_1, np.ones(hurst.size, bool)
-
-
 class Batch:
     """Surfaces prepared for about so many entries: for the table, and by their spectra outside of it."""
 
@@ -96,7 +84,7 @@ class Batch:
         self.rows = np.arange(h_rms.size)
         heights = h_max / h_rms
         table = calibrated_table.shipped()
-        hurst, zeta_1, is_self_affine = _power_laws(surface)
+        hurst, zeta_1, is_self_affine = power_laws_of(surface)
         columns = np.array([hurst, np.log(zeta_1), heights])
         self.covered = (
             is_self_affine
@@ -108,12 +96,7 @@ class Batch:
         if not self.whole:
             rows = np.flatnonzero(~self.covered)
             self.number = np.cumsum(~self.covered) - 1
-            laws = (
-                laws_of(surface)
-                if isinstance(surface, BandedSurface)
-                else self_affine_laws(hurst, zeta_1)
-            )
-            self.spectra = Spectra(laws[rows], alpha[rows], heights[rows])
+            self.spectra = Spectra(laws_of(surface)[rows], alpha[rows], heights[rows])
 
     def part(self, rows: NDArray[np.intp], shape: tuple[int, ...]) -> Batch:
         """Some of the surfaces, which share what was prepared for all."""
