@@ -22,7 +22,7 @@ from scipy.special import ellipkm1
 from scipy.stats import qmc
 
 from generate import cost_distances
-from generate.files import ROOT, to_csv
+from generate.files import ROOT, read_csv, to_csv
 from generate.timing import measure
 from mbma_tables import Scene, Surface, contact, contact_law, theories
 from mbma_tables.common.arguments import FloatArray
@@ -132,15 +132,18 @@ def island_error(phi_F: FloatArray, phi_A: FloatArray, truth: FloatArray) -> flo
     return float(np.abs(np.stack([phi_F, phi_A]) / truth - 1).max())
 
 
-def model_rows() -> Iterator[Row]:
+def model_rows(models: Sequence[str] | None = None) -> Iterator[Row]:
     """Models of islands that do not solve."""
     islands, truth = held_out()
     reported = get_variant("reported")
-    unsolved = [name for name in ISLAND_MODELS if name != "exact"]
-    models: list[tuple[str, str, Any]] = []
-    models += [(name, "island", get_model(name, 1e-8, reported)) for name in unsolved]
-    models += [("formula", f"island form={name}", FormulaModel(name)) for name in FORMS]
-    for island_model, name, model in models:
+    unsolved = [name for name in models or ISLAND_MODELS if name != "exact"]
+    named: list[tuple[str, str, Any]] = []
+    named += [(name, "island", get_model(name, 1e-8, reported)) for name in unsolved]
+    if models is None or "formula" in models:
+        named += [
+            ("formula", f"island form={name}", FormulaModel(name)) for name in FORMS
+        ]
+    for island_model, name, model in named:
         run = functools.partial(answer_islands, model, islands)
         answer = run()
         cost, _ = measure(run)
@@ -266,9 +269,9 @@ def scene_rows() -> Iterator[Row]:
     yield Row("scene", "call", "both", None, max(whole - step, 0.0))
 
 
-def gap_rows() -> Iterator[Row]:
+def gap_rows(models: Sequence[str] | None = None) -> Iterator[Row]:
     """Totals of each island model at several tolerances: the call, and each further gap."""
-    for island_model in ISLAND_MODELS:
+    for island_model in models or ISLAND_MODELS:
         batch = functools.partial(gap_batch, island_model=island_model)
         # costs of a surface with one gap, and with many
         one = measure(functools.partial(batch, 1, rtol=1e-2))[0] / len(SURFACES)
@@ -315,7 +318,13 @@ def answers_of_laws(laws: Sequence[Any]) -> list[dict[str, FloatArray]]:
 
 def law_rows() -> Iterator[Row]:
     """Making a law by island model and tolerance, and what a law answers."""
-    for island_model in ISLAND_MODELS:
+    yield from law_making_rows()
+    yield from law_answer_rows()
+
+
+def law_making_rows(models: Sequence[str] | None = None) -> Iterator[Row]:
+    """Making a law by island model and tolerance."""
+    for island_model in models or ISLAND_MODELS:
         timed = SURFACES[:2] if island_model == "exact" else SURFACES
         rtols = LAW_RTOLS if island_model == "universal" else SLOW_LAW_RTOLS
         for rtol in rtols:
@@ -324,6 +333,9 @@ def law_rows() -> Iterator[Row]:
             error = largest_error(answers)
             yield Row(island_model, at("law", rtol), "both", error, cost / len(timed))
 
+
+def law_answer_rows() -> Iterator[Row]:
+    """What a law answers."""
     law = contact_law(SURFACES[3], theory="mbma")
     gaps = gaps_of(SURFACES[3], 10_000)
     loads = law.pressure(separation=gaps)
@@ -407,9 +419,9 @@ def effect_rows() -> Iterator[Row]:
             yield Row(theory, f"{part} gap", "both", None, each)
 
 
-def first_use_rows() -> Iterator[Row]:
+def first_use_rows(models: Sequence[str] | None = None) -> Iterator[Row]:
     _, seconds = measure(lambda: None)
-    for island_model in ISLAND_MODELS:
+    for island_model in models or ISLAND_MODELS:
         command = [sys.executable, "-c", FIRST_USE.format(island_model)]
         taken = []
         for _ in range(4):
@@ -450,13 +462,52 @@ def study() -> bytes:
     return to_csv(head, pd.DataFrame([unit, *rows]), "%.4g")
 
 
+def again(island_model: str) -> bytes:
+    """The shipped costs with those of one island model measured anew, in the same places.
+
+    All are over the fixed work of their own run, so that those of two runs stand beside
+    one another.
+    """
+    models = (island_model,)
+    measured = [
+        row
+        for rows in (model_rows, gap_rows, law_making_rows, first_use_rows)
+        for row in rows(models)
+    ]
+    path = ROOT / "tables" / "cost.csv"
+    text = path.read_text(encoding="utf-8")
+    head = "".join(line for line in text.splitlines(True) if line.startswith("#"))
+    frame = read_csv(path)
+    key = ["island_model", "variant", "quantity"]
+    fresh = pd.DataFrame(measured).set_index(key)
+    numbers = frame.set_index(key)
+    missing = fresh.index.difference(numbers.index)
+    if len(missing):
+        raise click.ClickException(
+            f"the shipped costs lack {list(missing)}: measure all, without --model"
+        )
+    numbers.loc[fresh.index] = fresh
+    return to_csv(head, numbers.reset_index(), "%.4g")
+
+
 @click.command()
-def cost() -> None:
+@click.option(
+    "--model",
+    type=click.Choice([name for name in ISLAND_MODELS if name != "exact"]),
+    help="Only this island model; the others' rows stay.",
+)
+def cost(model: str | None) -> None:
     """Measure tables/cost.csv and tables/distance.csv.
 
     For `mbma cost`, plans of scenes and docs/cost.md.
     """
-    for name, content in {"cost": study, "distance": cost_distances.study}.items():
+    studies = {"cost": study, "distance": cost_distances.study}
+    if model is not None:
+        studies = {
+            "cost": functools.partial(again, model),
+            "distance": functools.partial(cost_distances.again, model),
+        }
+    for name, content in studies.items():
         write_file(ROOT / "tables" / f"{name}.csv", content(), make_folders=True)
         click.echo(f"tables/{name}.csv")
 

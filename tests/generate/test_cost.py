@@ -146,6 +146,40 @@ def test_a_study_becomes_data(tmp_path, monkeypatch):
     assert read_costs(tmp_path / "tables" / "cost.csv") == shipped
 
 
+def test_one_island_model_is_measured_anew_beside_the_others(tmp_path, monkeypatch):
+    shipped = shipped_costs()
+    few = {"RTOLS": (1e-1,), "SLOW_LAW_RTOLS": (1e-2,), "MANY": 5, "measure": once}
+    for name, value in few.items():
+        monkeypatch.setattr(cost, name, value)
+    monkeypatch.setattr(cost_distances, "measure", once)
+    (tmp_path / "tables").mkdir()
+    for name in ("cost", "distance"):
+        content = (ROOT / "tables" / f"{name}.csv").read_bytes()
+        (tmp_path / "tables" / f"{name}.csv").write_bytes(content)
+    for module in (cost, cost_distances):
+        monkeypatch.setattr(module, "ROOT", tmp_path)
+    monkeypatch.setattr(cost, "first_use_rows", lambda models: [])
+    done = CliRunner().invoke(cost.cost, ["--model", "island4d"], catch_exceptions=False)
+    assert done.exit_code == 0
+    found = read_costs(tmp_path / "tables" / "cost.csv")
+    assert found.seconds == shipped.seconds
+    changed = {
+        (new.island_model, new.variant): new
+        for old, new in zip(shipped.rows, found.rows, strict=True)
+        if new != old
+    }
+    assert set(changed) == {
+        ("island4d", name)
+        for name in ("island", "call", "gap rtol=1e-01", "law rtol=1e-02")
+    }
+    assert changed["island4d", "law rtol=1e-02"].cost == pytest.approx(COST / 6, rel=1e-3)
+    before, after = (
+        read_csv(folder / "tables" / "distance.csv") for folder in (ROOT, tmp_path)
+    )
+    (row,) = np.flatnonzero(before["cost"] != after["cost"])
+    assert after["way"][row] == "island4d"
+
+
 def test_the_gauge_names_every_theory_and_way_at_its_measured_place():
     known = read_csv(ROOT / "tables" / "distance.csv")
     rows = pages_cost.gauge_rows(known)
