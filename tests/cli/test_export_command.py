@@ -282,3 +282,13 @@ def test_a_header_has_the_command_and_hashes(target, tmp_path, monkeypatch):
     words = shlex.split(text.partition(": mbma export ")[2].partition("law.x")[0])
     assert [target, *given, "--out"] == words
     assert hashlib.sha256(path.read_bytes()).hexdigest() in text
+
+
+def test_code_takes_several_quantities(tmp_path):
+    more = ["--quantity", "mean_pressure", "--quantity", "flow_coefficient"]
+    run(
+        "python-law", *LAW, *more, "--theory", "calibrated", "--out", tmp_path / "road.py"
+    )
+    text = (tmp_path / "road.py").read_text()
+    assert "def mean_pressure(c" in text
+    assert "def flow_coefficient(c" in text

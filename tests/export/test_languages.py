@@ -1,6 +1,5 @@
 """Laws in every language of the registry: random laws, run back and compared with the library's within what they state."""
 
-import importlib.util
 import math
 import re
 import shutil
@@ -16,10 +15,11 @@ from law_points import KAPPA, TANGENTS, VALUES
 from mbma_tables import Bodies, Gas, Surface
 from mbma_tables.contacts.quantities import registry
 from mbma_tables.contacts.quantities.interface import Interface
-from mbma_tables.export.code.language import FUNCTIONS
+from mbma_tables.export.code.language import FUNCTIONS, evaluator
 from mbma_tables.export.code.languages import LANGUAGES
 from mbma_tables.export.code.law_code import asked_law, text_of
 from mbma_tables.export.exported_law import GasInGaps
+from mbma_tables.export.text import core_file
 
 HEAT = {"conductivity": 45.0, "conductivity_unit": "W/(m K)"}
 MORE = ("thermal_time", "mean_pressure", "flow_coefficient", "elastic_hardness")
@@ -36,6 +36,32 @@ def _thermal_time(monkeypatch):
     folder = __file__.rpartition("/export/")[0] + "/contacts/quantities"
     monkeypatch.syspath_prepend(folder)
     monkeypatch.setattr(registry, "MODULES", [*registry.MODULES, "thermal_time"])
+
+
+@pytest.mark.parametrize("target", LANGUAGES)
+def test_an_evaluator_is_a_plain_file_that_its_own_tools_check(target, tmp_path):
+    language = LANGUAGES[target]
+    if not language.check:
+        assert not language.evaluator
+        return
+    if language.check[0] != "python" and shutil.which(language.check[0]) is None:
+        pytest.skip(f"not installed: {language.check[0]}")
+    for module in language.program.modules:
+        pytest.importorskip(module)
+    path = tmp_path / language.evaluator
+    path.write_text(evaluator(language.evaluator))
+    for header in ("mbma.h", "elementary.h"):
+        (tmp_path / header).write_text(core_file(header))
+    command = [sys.executable if word == "python" else word for word in language.check]
+    for text, is_right in ((path.read_text(), True), (path.read_text() + "\n)(", False)):
+        path.write_text(text)
+        done = subprocess.run(
+            [word.format(file=language.evaluator) for word in command],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+        )
+        assert (done.returncode == 0) == is_right, done.stderr
 
 
 @st.composite
@@ -173,13 +199,12 @@ def compared(target, law, folder):
 )
 def test_random_laws_are_run_back_within_their_stated_error(target, tmp_path_factory):
     program = LANGUAGES[target].program
-    words = [command.split()[0] for command in program.commands]
-    for word in {word for word in words if word != "python" and "/" not in word}:
-        if shutil.which(word) is None:
+    words = {command.split()[0] for command in program.commands} - {"python"}
+    for word in words:
+        if not word.startswith("./") and shutil.which(word) is None:
             pytest.skip(f"not installed: {word}")
     for module in program.modules:
-        if importlib.util.find_spec(module) is None:
-            pytest.skip(f"not installed: {module}")
+        pytest.importorskip(module)
 
     @hypothesis.settings(
         max_examples=EXAMPLES[target],

@@ -29,6 +29,11 @@ static const struct {{
 static const mbma_law {name} = {{&{name}_DATA.head, {name}_DATA.rows, {name}_DATA.records, \
 {records} - 1}};
 """
+# a command that finds errors in the evaluator of C
+CHECK = (
+    *("gcc", "-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"),
+    *("-fsyntax-only", "{file}"),
+)
 # functions that other files see, where they are made
 _DEFINED = re.compile(
     r"^(?!static|typedef|MBMA_INLINE)\w[\w *]*\b(mbma_\w+)\([^{;]*\{$", re.M

@@ -99,6 +99,7 @@ class Language:
     call: str  # of a function, with {name}, {what} and {x}
     program: Program
     evaluator: str = ""
+    check: tuple[str, ...] = ()  # a command of its own tools that finds errors in {file}
     number: Callable[[float], str] = number
     # a column, or rows of polynomials, where the language has numbers of laws and curves
     array: Callable[[FloatArray], str] | None = None

@@ -3,7 +3,7 @@
 import functools
 from collections.abc import Mapping
 
-from mbma_tables.export.code.core_code import core_places
+from mbma_tables.export.code.core_code import CHECK, core_places
 from mbma_tables.export.code.language import Language, Program
 from mbma_tables.export.text import number
 
@@ -62,6 +62,7 @@ def subroutine(
     return Language(
         template="law.c",
         evaluator="law.c",
+        check=CHECK,
         mark="/*",
         usage=usage,
         call="{name}_{what}({x})",

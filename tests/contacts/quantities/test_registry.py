@@ -2,6 +2,8 @@
 
 import inspect
 import json
+import types
+import zipfile
 
 import numpy as np
 import pytest
@@ -255,6 +257,50 @@ def test_a_declared_quantity_has_rows(thermal_time):
         assert "thermal_time [s] against pressure [MPa]" in text
     with pytest.raises(InputError, match=r"CalculiX takes .*got thermal_time"):
         joint.export("calculix", RANGE, quantity="thermal_time")
+
+
+@pytest.mark.parametrize("metals", [METALS, "silver"])
+def test_a_declared_quantity_is_a_function_of_laws_as_code(
+    thermal_time, metals, tmp_path
+):
+    """Functions of code were a list of five; `tests/export/test_languages.py` runs each language."""
+    joint = Joint(FACE, bodies=metals, theory="calibrated")
+    pressed = joint.at(pressure=[f"{p} MPa" for p in (1.0, 10.0, 50.0)])
+    c = 1e-3 * (FACE.h_max - np.asarray(pressed.mean_separation))  # mm
+    road = types.ModuleType("road")
+    exec(joint.export("python-law", name="road", quantity="thermal_time"), vars(road))
+    np.testing.assert_allclose(road.thermal_time(c), pressed.thermal_time, rtol=5e-5)
+    # where bodies are apart no heat flows
+    assert road.thermal_time(-1.0) == np.inf
+    for target, words in {
+        "c-law": "double road_thermal_time(double c)",
+        "javascript-law": "const thermal_time = (c) =>",
+        "matlab-law": "kept.thermal_time = @(c)",
+        "modelica-law": "function thermal_time",
+    }.items():
+        text = joint.export(target, name="road", quantity="thermal_time")
+        assert words in text
+        assert "thermal_time [s]" in text
+        assert "thermal_time is within" in text
+    joint.export("fmu", name="road", quantity="thermal_time", path=tmp_path / "road.fmu")
+    with zipfile.ZipFile(tmp_path / "road.fmu") as archive:
+        assert b'name="thermal_time"' in archive.read("modelDescription.xml")
+
+
+def test_quantities_without_a_function_are_refused_by_name(thermal_time):
+    joint = Joint(FACE, bodies=METALS, theory="calibrated")
+    for name, words in {
+        "valid": "valid is true or false",
+        "scatter": "scatter has no function of the overclosure: it is not known",
+        "energy_depth": "energy_depth needs an elastic contact",
+    }.items():
+        with pytest.raises(InputError, match=words):
+            joint.export("c-law", quantity=name)
+    elastic = Joint(FACE, bodies="57.5 GPa", theory="calibrated")
+    with pytest.raises(
+        InputError, match=r"psi has no function .* zero, or not known, at"
+    ):
+        elastic.export("c-law", quantity="psi")
 
 
 def test_rows_of_every_quantity_are_those_of_the_contact():

@@ -2,7 +2,7 @@
 
 import functools
 
-from mbma_tables.export.code.core_code import core_places
+from mbma_tables.export.code.core_code import CHECK, core_places
 from mbma_tables.export.code.language import NAN, Beside, Language, Program
 from mbma_tables.export.text import number
 
@@ -33,6 +33,7 @@ LANGUAGES = {
     "c-law": Language(
         template="law.c",
         evaluator="law.c",
+        check=CHECK,
         mark="/*",
         usage=(
             "C99, also C++11: cc -O2 -c {name}.c, link with -lm; {name}.h beside it declares "

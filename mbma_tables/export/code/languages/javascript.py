@@ -45,6 +45,7 @@ LANGUAGES = {
     "javascript-law": Language(
         template="law.mjs",
         evaluator="law.mjs",
+        check=("node", "--check", "{file}"),
         mark="/*",
         usage=(
             "import {{ pressure, with_tangent, curvature, area, energy, overclosure }} from "

@@ -34,6 +34,7 @@ LANGUAGES = {
     "matlab-law": Language(
         template=TEMPLATE,
         evaluator=TEMPLATE,
+        check=("octave-cli", "--no-init-file", "--eval", "__parse_file__('{file}')"),
         mark="%",
         usage=(
             "MATLAB and Octave: law = {name}(); arrays of any shape. Outside the range: an "

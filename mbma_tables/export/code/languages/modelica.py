@@ -56,6 +56,12 @@ def _places(asked: AskedLaw) -> dict[str, Any]:
     return {"evaluator": _functions(), "units": units}
 
 
+CHECK = """
+import pathlib, rumoca
+found = rumoca.validate_source(pathlib.Path("{file}").read_text())
+errors = [str(one) for one in found if one.level == "error"]
+raise SystemExit("".join(errors))
+"""
 PROGRAM = Program(
     "ask.py",
     """\

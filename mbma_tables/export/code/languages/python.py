@@ -41,6 +41,7 @@ LANGUAGES = {
     "python-law": Language(
         template="law.py",
         evaluator="law_numpy.py",
+        check=("python", "-m", "py_compile", "{file}"),
         mark="#",
         usage=(
             "Python with numpy alone: import {name}; arrays of any shape. Outside the range: "
@@ -57,6 +58,7 @@ LANGUAGES = {
     "jax-law": Language(
         template="law.py",
         evaluator="law_jax.py",
+        check=("python", "-m", "py_compile", "{file}"),
         mark="#",
         usage=(
             "Python with jax alone, differentiable by c, p and the pytree LAW. Set "

@@ -1,4 +1,4 @@
-package law "Quantities of a law as functions of overclosure, of which each law has the numbers"
+package Law "Quantities of a law as functions of overclosure, of which each law has the numbers"
   function piece "The record of x: as many edges are at or below x, and one more"
     input Real x;
     input Real all_edges[:];
@@ -45,4 +45,4 @@ package law "Quantities of a law as functions of overclosure, of which each law 
   algorithm
     y := u^3*(1 - 1.5/((u/h_rms)^2 + 4));
   end flow_apart;
-end law;
+end Law;
