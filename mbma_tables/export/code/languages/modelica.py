@@ -60,7 +60,7 @@ CHECK = """
 import pathlib, rumoca
 found = rumoca.validate_source(pathlib.Path("{file}").read_text())
 errors = [str(one) for one in found if one.level == "error"]
-raise SystemExit("".join(errors))
+raise SystemExit("".join(errors) or None)
 """
 PROGRAM = Program(
     "ask.py",
@@ -98,8 +98,11 @@ end Ask;
 c = np.loadtxt("c.txt", ndmin=1)
 gaps = ", ".join(map(repr, c.tolist()))
 model = MODEL.replace("SIZE", str(c.size)).replace("GAPS", gaps)
-pathlib.Path("both.mo").write_text(pathlib.Path("{{ name }}.mo").read_text() + model)
-found = rumoca.Session().load("both.mo", model="Ask").simulate(t=(0, c.size - 1), dt=1)
+# in a folder of its own: rumoca reads all files beside one
+both = pathlib.Path("both", "both.mo")
+both.parent.mkdir()
+both.write_text(pathlib.Path("{{ name }}.mo").read_text() + model)
+found = rumoca.Session().load(str(both), model="Ask").simulate(t=(0, c.size - 1), dt=1)
 assert (np.asarray(found["c"]) == c).all()
 columns = [found[f"y{k + 1}"] for k in range({{ functions|length }})]
 np.savetxt("values.txt", np.transpose(columns), "%.17g")
@@ -113,6 +116,8 @@ np.savetxt("values.txt", np.transpose(columns), "%.17g")
 LANGUAGES = {
     "modelica-law": Language(
         template=TEMPLATE,
+        evaluator=TEMPLATE,
+        check=("python", "-c", CHECK),
         mark="//",
         usage=(
             "A Modelica package: p = {name}.pressure(c), with its derivative; where p is known "
