@@ -8,7 +8,7 @@ import json
 import os
 import pathlib
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -16,6 +16,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import least_squares
+from sklearn.model_selection import PredefinedSplit
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file, written_bytes
@@ -83,6 +84,17 @@ def fitted(
     return trial(best.x)
 
 
+def folds(groups: Sequence[Any]) -> Iterator[tuple[Sequence[int], Sequence[int]]]:
+    """Numbers of the entries of other groups, and of those of a fifth of the groups, by turns.
+
+    A fold has every fifth group in their order, so that it spans their whole range.
+    """
+    rank = {group: number for number, group in enumerate(sorted(set(groups)))}
+    split = PredefinedSplit([rank[group] % FOLDS for group in groups])
+    for others, left_out in split.split():
+        yield others.tolist(), left_out.tolist()
+
+
 def cross_validated(
     seen: Sequence[Any],
     fit: Callable[[list[Any]], Fitted],
@@ -91,12 +103,10 @@ def cross_validated(
 
     A fifth of the nodes is left out at a time.
     """
-    nodes = sorted({one.node for one in seen})
     constants_of_others = dict[Any, Fitted]()
-    for fold in range(FOLDS):
-        left_out = set(nodes[fold::FOLDS])
-        constants = fit([one for one in seen if one.node not in left_out])
-        constants_of_others |= dict.fromkeys(left_out, constants)
+    for others, left_out in folds([one.node for one in seen]):
+        constants = fit([seen[k] for k in others])
+        constants_of_others |= {seen[k].node: constants for k in left_out}
     return constants_of_others
 
 

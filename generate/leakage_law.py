@@ -22,10 +22,10 @@ from generate.boundary_elements.surfaces import (
     TRAINING,
 )
 from generate.calibrated_file import (
-    FOLDS,
     bins,
     by_bin,
     fitted,
+    folds,
     law_table,
     rms,
     within,
@@ -256,11 +256,9 @@ def left_out(training: Sequence[Flow], constants: FlowConstants) -> FloatArray:
     """
     flows = [flow for flow in training if SETS["training"](flow.one)]
     parts = []
-    for fold in range(FOLDS):
-        others = [flow for number, flow in enumerate(flows) if number % FOLDS != fold]
-        constants_of_others = fit(others, constants)
-        unseen = flows[fold::FOLDS]
-        parts += [errors(flow, flow.medium(constants_of_others)) for flow in unseen]
+    for others, unseen in folds(range(len(flows))):
+        constants_of_others = fit([flows[k] for k in others], constants)
+        parts += [errors(flows[k], flows[k].medium(constants_of_others)) for k in unseen]
     return summary(parts)
 
 

@@ -17,6 +17,7 @@ from collections.abc import Iterable
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from sklearn.model_selection import LeaveOneGroupOut
 
 from generate.machined.makers import FAMILIES
 from generate.page import table
@@ -150,11 +151,13 @@ def left_out(data: xr.Dataset, form: str, quantity: str) -> dict[str, FloatArray
     families = data.family.values
     parts = data.surface.values if form == "calibrated" else families
     ratios: dict[str, list[FloatArray]] = {family: [] for family in FAMILIES}
-    for part in np.unique(parts):
-        of_part = counted & (parts == part)[:, None, None]
+    for others, left_out_ones in LeaveOneGroupOut().split(parts, groups=parts):
+        is_other, is_left_out = np.zeros((2, len(parts)), dtype=bool)
+        is_other[others], is_left_out[left_out_ones] = True, True
+        of_part = counted & is_left_out[:, None, None]
         if of_part.any():
-            ratio = error / scatter(data, form, quantity, parts != part)[..., None]
-            family = families[parts == part][0]
+            ratio = error / scatter(data, form, quantity, is_other)[..., None]
+            family = families[left_out_ones[0]]
             ratios[family].append(ratio[of_part & np.isfinite(ratio)])
     # a family without a valid answer has no ratio
     return {
