@@ -285,7 +285,7 @@ def test_a_header_has_the_command_and_hashes(target, tmp_path, monkeypatch):
 
 
 def test_code_takes_several_quantities(tmp_path):
-    more = ["--quantity", "mean_pressure", "--quantity", "flow_coefficient"]
+    more = ["--quantity", "mean_pressure,flow_coefficient"]
     out = ["--theory", "calibrated", "--out", tmp_path / "road.py"]
     result = run("python-law", *LAW[:-2], *more, *out)
     assert result.exit_code == 0, result.output
