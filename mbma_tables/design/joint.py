@@ -71,10 +71,18 @@ from mbma_tables.design.uncertainty import (
     uncertainty_of,
 )
 from mbma_tables.design.unknowns import OfOneMap, Unknowns, unknowns_of
+from mbma_tables.islands.island_models import beside
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import TOPS
 from mbma_tables.surfaces.surface import Surface, assumptions
-from mbma_tables.theories import OF_MAPS, THEORIES, is_table, resolve, theory_text
+from mbma_tables.theories import (
+    OF_MAPS,
+    THEORIES,
+    is_table,
+    options_of,
+    resolve,
+    theory_text,
+)
 from mbma_tables.theories.base import Theory
 
 if TYPE_CHECKING:
@@ -459,7 +467,8 @@ class Joint(JointQuantities, Displayed):
     def from_toml(cls, path: str | os.PathLike[str]) -> Joint:
         """The joint that a TOML file describes: the arguments by name, the parts as tables.
 
-        Paths of maps are relative to the file.
+        Options of the theory "mbma", such as ``island_model = "mine.nc"``, are entries too.
+        Paths of maps and of tables are relative to the file.
 
         Raises
         ------
@@ -481,6 +490,12 @@ class Joint(JointQuantities, Displayed):
     ) -> Joint:
         """The joint of the entries of a TOML file, whose path is that of a file of maps and of messages."""
         given = dict(entries)
+        names = [name for name in options_of("mbma") if name in given]
+        options = {name: given.pop(name) for name in names}
+        if "island_model" in options:
+            options["island_model"] = beside(options["island_model"], path.parent)
+        if options:
+            given["theory"] = resolve(given.get("theory", "mbma"), options=options)
         for name in FACES:
             part = given.get(name)
             if isinstance(part, Mapping) and "map" in part:

@@ -1,6 +1,7 @@
 """Island models: force, area and error of an island at (X, mu), by name or as an object."""
 
 import dataclasses
+import pathlib
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -23,6 +24,16 @@ def check_outside(outside: str) -> None:
     """Reject values that are not in `OUTSIDE`."""
     if outside not in OUTSIDE:
         raise InputError(f"outside must be one of {OUTSIDE}, got {outside!r}")
+
+
+def beside(island_model: Any, folder: pathlib.Path) -> str | pathlib.Path:
+    """An island model that a file in `folder` names: a table's path is relative to the folder."""
+    if not isinstance(island_model, str):
+        raise InputError(
+            f"island_model must be one of {', '.join(ISLAND_MODELS)}, or the file of a table, "
+            f"got {island_model!r}"
+        )
+    return island_model if island_model in ISLAND_MODELS else folder / island_model
 
 
 class Certificate(NamedTuple):

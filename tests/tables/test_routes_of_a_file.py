@@ -1,17 +1,30 @@
 """Routes that take a table by its file; each answers what the shipped table does, within both tables' errors."""
 
 import json
+import os
+import pickle
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from helpers import refused
 from small_tables import small_table
 
-from mbma_tables import Scene, Surface, contact, contact_law, island
+from mbma_tables import (
+    Joint,
+    Scene,
+    Surface,
+    contact,
+    contact_law,
+    island,
+    sensitivity,
+)
 from mbma_tables.cli import main
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.design.scenes.plan import certified_error
+from mbma_tables.export.page.explorer import explorer_page
 from mbma_tables.tables.open import open_table
+from mbma_tables.tables.schema import KINDS
 from mbma_tables.tables.writer import write_table
 from mbma_tables.theories import Mbma
 
@@ -33,6 +46,24 @@ separations = [2.0]
 [accuracy]
 rtol = 0.05
 """
+
+
+JOINT = """
+bodies = "1 GPa"
+theory = "mbma"
+island_model = {model!r}
+outside = "exact"
+[part_a]
+hurst = 0.8
+Rq = "1 um"
+h_max = "3 um"
+longest = "6.28 um"
+shortest = "0.21 um"
+"""
+
+
+def is_file(table):
+    return table not in KINDS
 
 
 @pytest.fixture(scope="module", params=["universal", "island4d"])
@@ -84,7 +115,54 @@ def by_island(table, folder):
     return island(SURFACE, 1.0, island_model=table).force
 
 
-ROUTES = [by_contact, by_many, by_law, by_scene, by_scene_file, by_command, by_island]
+def by_joint(table, folder):
+    theory = Mbma(island_model=table)
+    return Joint(SURFACE, bodies=1.0, theory=theory).at(separation=GAP).pressure
+
+
+def by_joint_file(table, folder):
+    # of a path that is relative to the file, as of maps
+    name = os.path.relpath(table, folder) if is_file(table) else table
+    (folder / "joint.toml").write_text(JOINT.format(model=name))
+    return Joint.from_toml(folder / "joint.toml").at(separation="2 um").pressure
+
+
+def by_joint_command(table, folder):
+    (folder / "joint.toml").write_text(JOINT.format(model=str(table)))
+    asked = ["joint", str(folder / "joint.toml"), "--pressure", "50MPa", "--json"]
+    result = CliRunner().invoke(main, asked)
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout)["columns"]["area"][0]
+
+
+def by_sensitivity(table, folder):
+    theory = Mbma(island_model=table)
+    found = sensitivity(SURFACE, separation=GAP, theory=theory, quantities=["pressure"])
+    return found.answers["pressure"]
+
+
+def by_plan(table, folder):
+    """The plan's error is the certificate's, and its cost that of the kind of table."""
+    scene = Scene(
+        SURFACE, separations=[GAP], island_model=table, theory="mbma", rtol=0.05
+    )
+    plan = scene.plan()
+    (step,) = (step for step in plan.steps if step.island_model is not None)
+    certificate = open_table(table).content.attributes
+    largest = max(certificate[f"largest_error_{name}"] for name in "FA")
+    assert step.error == pytest.approx(step.rtol + largest)
+    kind = open_table(table).name
+    alike = Scene(SURFACE, separations=[GAP], island_model=kind, theory="mbma", rtol=0.05)
+    assert plan.seconds == alike.plan().seconds > 0
+    found = scene.run()
+    assert found.attrs["error"] > 0
+    return found["pressure"].values[0]
+
+
+ROUTES = [
+    *(by_contact, by_many, by_law, by_scene, by_scene_file, by_command, by_island),
+    *(by_joint, by_joint_file, by_joint_command, by_sensitivity, by_plan),
+]
 
 
 @pytest.mark.parametrize("route", ROUTES)
@@ -95,6 +173,61 @@ def test_routes_that_take_a_tables_file(route, path, tmp_path):
     assert found == pytest.approx(shipped, rel=0.1)
     assert found != shipped
     assert float(np.squeeze(route(str(path), tmp_path))) == found
+
+
+def test_the_page_of_the_explorer_refuses_a_table_by_name(path, tmp_path):
+    """It holds the shipped table; another one is neither taken nor left out silently."""
+    with pytest.raises(InputError, match="with the shipped table of islands, got Mbma"):
+        explorer_page(SURFACE, theory=Mbma(island_model=path))
+    out = tmp_path / "page.html"
+    numbers = [
+        "--hurst",
+        "0.8",
+        "--q0",
+        "1",
+        "--q1",
+        "30",
+        "--h-rms",
+        "1",
+        "--h-max",
+        "3",
+    ]
+    asked = ("explore", *numbers, "--island-model", str(path), "--out", str(out))
+    assert "No such option '--island-model'" in refused(*asked)
+    assert not out.exists()
+
+
+def test_a_law_through_a_coarse_table_of_four_numbers_is_within_its_error(tmp_path):
+    file = write_table(tmp_path / "coarse.nc", small_table("island4d"))
+    coarse = Mbma(island_model=file, outside="exact", rtol=1e-2)
+    law = contact_law(SURFACE, 1.0, coarse)
+    gaps = np.linspace(0.3, 2.8, 26)
+    exact = contact(
+        SURFACE, separation=gaps, theory=Mbma(island_model="exact", rtol=1e-8)
+    )
+    for name in ("pressure", "area"):
+        found = getattr(law, name)(separation=gaps)
+        difference = np.abs(found / getattr(exact, name) - 1)
+        assert difference.max() <= law.error
+        # the coarse table is what is seen, not the shipped one
+        assert difference.max() > 1e-6
+    assert pickle.loads(pickle.dumps(law)).pressure(1.0) == law.pressure(1.0)
+
+
+@pytest.mark.parametrize(
+    ("entries", "message"),
+    [
+        ({"island_model": 5}, "island_model must be one of .*, or the file of a table"),
+        ({"island_model": "nowhere.nc"}, r"nowhere\.nc: cannot be read"),
+        ({"island_model": "exact", "theory": "calibrated"}, "island_model"),
+        ({"outside": "zero"}, "outside must be one of"),
+    ],
+)
+def test_wrong_options_of_a_joints_file_are_refused_by_name(entries, message, tmp_path):
+    part = {"Rq": "1 um", "hurst": 0.8, "longest": "6 um", "shortest": "0.2 um"}
+    joint = {"bodies": "1 GPa", "part_a": part} | entries
+    with pytest.raises((InputError, TableFileError), match=message):
+        Joint.from_entries(joint, tmp_path / "joint.toml")
 
 
 def test_theories_of_one_file_are_equal(path):

@@ -13,7 +13,7 @@ from mbma_tables.common.toml_files import check, read_toml
 from mbma_tables.design.scenes.plan import Plan, make_plan
 from mbma_tables.design.scenes.problem import Problem
 from mbma_tables.design.scenes.specimen import from_tables, refuse_joint, schema
-from mbma_tables.islands.island_models import ISLAND_MODELS
+from mbma_tables.islands.island_models import beside
 
 if TYPE_CHECKING:
     import xarray
@@ -130,8 +130,8 @@ class Scene(Problem):
             for name in ("title", "theory", "variant", "island_model")
             if name in content
         }
-        if found.get("island_model", "exact") not in ISLAND_MODELS:
-            found["island_model"] = folder / found["island_model"]
+        if "island_model" in found:
+            found["island_model"] = beside(found["island_model"], folder)
         for name in (
             "prescribed",
             "pressure_profile",

@@ -166,7 +166,10 @@ def explorer_page(
     # a page has no simulation of a map
     theory = "calibrated" if theory in OF_MAPS else theory
     if theory not in THEORIES:
-        raise InputError(f"the page has the theories {THEORIES}, got {theory!r}")
+        raise InputError(
+            f"the page has the theories {THEORIES}, with the shipped table of islands, "
+            f"got {theory!r}"
+        )
     if measured and "island_model" in options_of(theory):
         raise InputError(
             f"islands in the page, of theory {theory!r}, are of surfaces of five numbers: "
