@@ -44,6 +44,7 @@ from mbma_tables import (
     contact,
     contact_law,
     greenwood_tripp,
+    in_chunks,
     open_table,
 )
 from mbma_tables.common.files import shipped_file
@@ -59,6 +60,11 @@ GAPS = 100_000
 MANY_GAPS = 1_000_000
 CALLS = 10_000  # of one number: a loop of them, not its first ones
 JOINTS = 10_000
+MILLION = 1_000_000
+METALS = ("steel 4140 hard", "aluminium 6061 hard")
+HARD = Bodies(hardness=0.1)
+BAND_NUMBERS = ("hurst", "longest", "shortest")
+FLOWS = ("flow_coefficient", "hydraulic_aperture", "leakage_scatter")
 DESIGNS = 20  # surfaces of a design loop, likewise
 NOMINAL_EXACT = 15_000  # islands/s, a rate to compare with that is not measured here
 SEED = 7
@@ -346,53 +352,114 @@ def few_numbers(rng: np.random.Generator) -> None:
         report(name, 1e6 * spent, "us", at_most=most)
 
 
-def joints(rng: np.random.Generator) -> None:
-    """Two parts of metal: ten thousand designs at once, and one design from its numbers to its table."""
-    band = {
-        "hurst": rng.uniform(0.6, 0.95, JOINTS),
-        "longest": rng.uniform(200.0, 800.0, JOINTS),
-        "shortest": rng.uniform(2.0, 8.0, JOINTS),
-        "unit": "um",
-    }
-    faces = [band | {"Rq": rng.uniform(0.2, most, JOINTS)} for most in (0.8, 1.6)]
-    pressures = rng.uniform(1e-3, 0.05, JOINTS)
-    metals = ("steel 4140 hard", "aluminium 6061 hard")
+def _parts(rng: np.random.Generator, count: int) -> list[dict[str, Any]]:
+    """Two faces of many joints, each with a band of its own."""
+    return [
+        {
+            "hurst": rng.uniform(0.6, 0.95, count),
+            "longest": rng.uniform(200.0, 800.0, count),
+            "shortest": rng.uniform(2.0, 8.0, count),
+            "Rq": rng.uniform(0.2, most, count),
+            "unit": "um",
+        }
+        for most in (0.8, 1.6)
+    ]
 
-    def batch() -> None:
-        joint = Joint(*faces, bodies=metals, nominal_area="4 cm^2", friction=0.2)
-        pressed = joint.at_pressure(pressures)
-        for name in pressed.available():
+
+def _every_quantity(
+    faces: list[dict[str, Any]], pressures: np.ndarray, flow: bool
+) -> None:
+    """All quantities of a batch of joints, those of flow where they are asked for."""
+    joint = Joint(*faces, bodies=METALS, nominal_area="4 cm^2", friction=0.2)
+    pressed = joint.at_pressure(pressures)
+    for name in pressed.available():
+        if flow or name not in FLOWS:
             pressed.quantity(name)
 
-    one_band = {"hurst": 0.8, "longest": 500.0, "unit": "um"}
+
+def _table_of_one(shortest: float, changed: float) -> None:
+    """A design that nothing is kept of, from its numbers to its table."""
+    band = {"hurst": 0.8, "longest": 500.0, "unit": "um"}
+    joint = Joint(
+        band | {"Rq": 0.4, "shortest": 8.0},
+        band | {"Rq": 0.7 * changed, "shortest": shortest},
+        bodies=METALS,
+        nominal_area="4 cm^2",
+    )
+    joint.table(["1 MPa", "10 MPa", "50 MPa"])
+
+
+def joints(rng: np.random.Generator) -> None:
+    """Two parts of metal, surfaces beyond the table, and a million candidates."""
+    faces = _parts(rng, JOINTS)
+    alike = [face | {n: faces[0][n] for n in BAND_NUMBERS} for face in faces]
+    pressures = rng.uniform(1e-3, 0.05, JOINTS)
     fresh = itertools.count(1)
 
-    def table(shortest: float) -> None:
-        # a design that nothing is kept of
-        other = {"Rq": 0.7 * (1 + 1e-9 * next(fresh)), "shortest": shortest}
-        joint = Joint(
-            one_band | {"Rq": 0.4, "shortest": 8.0},
-            one_band | other,
-            bodies=metals,
-            nominal_area="4 cm^2",
-        )
-        joint.table(["1 MPa", "10 MPa", "50 MPa"])
+    def tables(shortest: float) -> None:
+        for _ in range(DESIGNS):
+            _table_of_one(shortest, 1 + 1e-9 * next(fresh))
 
-    taken = rounds(
-        {
-            "batch": batch,
-            "one": lambda: [table(8.0) for _ in range(DESIGNS)],
-            "two bands": lambda: [table(5.0) for _ in range(DESIGNS)],
-        }
-    )
+    def beyond(top: float, bodies: Any, theory: str) -> None:
+        # surfaces that nothing is kept of
+        heights = 0.01 * (1 + 1e-9 * next(fresh))
+        numbers = faces[0]["hurst"], 1.0, rng.uniform(30, 300, JOINTS), heights
+        surface = Surface(*numbers, rng.uniform(top, 1.2 * top, JOINTS) * heights)
+        contact(surface, bodies, pressure=2e-4, theory=theory)
+
+    def million() -> None:
+        def make(some: slice) -> Any:
+            size = some.stop - some.start
+            surface = Surface(
+                rng.uniform(0.6, 0.95, size), 1.0, rng.uniform(30, 300, size), 0.01, 0.04
+            )
+            return contact(surface, HARD, pressure=2e-4, theory="calibrated").area
+
+        for _ in in_chunks(make, MILLION // 10):
+            pass
+
+    asked: dict[str, Callable[[], None]] = {
+        "alike": lambda: _every_quantity(alike, pressures, flow=True),
+        "batch": lambda: _every_quantity(faces, pressures, flow=True),
+        "without flow": lambda: _every_quantity(faces, pressures, flow=False),
+        "one": lambda: tables(8.0),
+        "two bands": lambda: tables(5.0),
+        "inside": lambda: beyond(4.0, 1.0, "calibrated"),
+        "beyond": lambda: beyond(8.1, 1.0, "calibrated"),
+        "beyond, hard": lambda: beyond(8.1, HARD, "calibrated"),
+        "mbma": lambda: beyond(3.0, 1.0, "mbma"),
+    }
+    taken = rounds(asked, 3)
     click.echo("\nJoints of two parts of metal")
-    name = f"{JOINTS} joints by pressure, every quantity"
-    report(name, statistics.median(taken["batch"]), "s", at_most=2)
+    for name, key, most in (
+        ("joints of parts with one band by pressure, every quantity", "alike", 2),
+        ("joints of parts with two bands, likewise", "batch", 2),
+        ("the same without flow through the gaps", "without flow", 2),
+    ):
+        report(f"{JOINTS} {name}", statistics.median(taken[key]), "s", at_most=most)
     for name, key, most in (
         ("one joint, from its numbers to its table", "one", 5.0),
         ("one joint whose parts have two bands, likewise", "two bands", None),
     ):
         report(name, 1e-3 * microseconds(taken[key], DESIGNS), "ms", at_most=most)
+    for name, key, most in (
+        ("a surface beyond the table, by pressure", "beyond", 30.0),
+        ("the same with a hardness", "beyond, hard", 60.0),
+        ("MBMA by pressure, a surface", "mbma", 25.0),
+    ):
+        report(name, microseconds(taken[key], JOINTS), "us", at_most=most)
+    slower = times_faster(taken, "beyond", "inside")
+    report("a surface beyond the table over one inside it", slower, "x")
+    # its threads are not those that rounds measure
+    start = time.process_time()
+    million()
+    spent = 10 * (time.process_time() - start)
+    report(
+        "a million surfaces with a hardness in chunks, of one core",
+        spent,
+        "s",
+        at_most=20,
+    )
 
 
 FIRST = {

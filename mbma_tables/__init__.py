@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from mbma_tables import theories as theories
     from mbma_tables.bodies import materials as materials
     from mbma_tables.bodies.bodies import Bodies as Bodies
+    from mbma_tables.common.chunks import in_chunks as in_chunks
     from mbma_tables.contacts.contact import contact as contact
     from mbma_tables.contacts.law.law import ContactLaw as ContactLaw
     from mbma_tables.contacts.law.make import contact_law as contact_law
@@ -55,6 +56,7 @@ _HOMES = {
     "contact_function": "mbma_tables.design.functions",
     "contact_law": "mbma_tables.contacts.law.make",
     "flow_factors": "mbma_tables.effects.film",
+    "in_chunks": "mbma_tables.common.chunks",
     "island": "mbma_tables.theories.mbma.island",
     "open_table": "mbma_tables.tables.open",
     "rough_contact": "mbma_tables.effects.rough_contact",
