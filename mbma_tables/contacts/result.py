@@ -58,7 +58,6 @@ OF_FALLING = ", also where a smaller one follows a larger one: that is no unload
 # labels of panels whose quantities do not end in it
 PANELS = {"area": "real contact area  A/A0", "mean_separation": "mean gap"}
 CURVES = ("mean_separation", "pressure", "area")
-CONDUCTANCES = ("total_conductance", "solid_conductance", "gas_conductance")
 
 
 def panel_label(name: str, unit: str) -> str:
@@ -455,7 +454,7 @@ class Contact(State, Displayed):
         given = self.bodies.conductivity_is_given
         return {
             shown_name: self._shown(shown_name)
-            for name in CONDUCTANCES
+            for name in registry.conductances()
             if given and registry.get(name).is_available(self)
             for shown_name in (name, f"{name}_scatter")
         }

@@ -12,7 +12,7 @@ from typing import Any
 from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
-from mbma_tables.contacts.quantities.registry import registry
+from mbma_tables.contacts.quantities.registry import conductances, get, registry
 from mbma_tables.export.law_table import Curve, LawTable
 from mbma_tables.export.text import checked_name, comment
 
@@ -35,13 +35,12 @@ STAY_WITHIN_ROWS = (
     "Stay within the rows: the solver's behaviour beyond them was not tested."
 )
 MAX_NAME = 80  # letters of a name, as CalculiX and Abaqus read them
-# of a joint: of solid spots and gas together, and of the solid spots alone
-CONDUCTANCES = ("total_conductance", "solid_conductance")
+# those that the solid spots have a part in: of spots and gas together, and of the spots alone
+CONDUCTANCES = tuple(name for name in conductances() if get(name).made_of)
 # by quantity: options for it alone, and the abscissa of its rows; any other quantity of the
 # registry has rows against pressure
 OPTIONS = {
-    "total_conductance": {"conductivity", "conductivity_unit"},
-    "solid_conductance": {"conductivity", "conductivity_unit"},
+    **{name: {"conductivity", "conductivity_unit"} for name in CONDUCTANCES},
     "tangential_stiffness": {"kappa"},
     "film": {"peklenik"},
 }

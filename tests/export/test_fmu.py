@@ -11,6 +11,7 @@ from helpers import refusals
 from law_points import ASKED, CONDUCTIVITY, KAPPA, needs, points
 
 from mbma_tables import InputError
+from mbma_tables.contacts.quantities import registry
 from mbma_tables.export.code.fmu import fmu
 
 HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
@@ -187,6 +188,11 @@ def test_description():
     assert {unit: float(factor) for unit, factor in size.items()} == pytest.approx(
         expected
     )
+    # as quantities are declared, not in texts of the format's own
+    said = {variable.name: variable.description for variable in read.modelVariables}
+    for name in ("pressure", "area", "solid_conductance", "tangential_stiffness"):
+        assert said[name] == registry.get(name).meaning
+    assert said["leakage"] == registry.get("flow_coefficient").meaning
     for words in ("theory 'calibrated'", "range:", "within", "scatter"):
         assert words in read.description
     assert read.modelExchange.providesDirectionalDerivative

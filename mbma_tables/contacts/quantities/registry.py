@@ -19,7 +19,7 @@ import numpy as np
 from mbma_tables.common import units as of_arguments
 from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import MissingError
-from mbma_tables.common.units import Dimension, Units
+from mbma_tables.common.units import HEAT_CONDUCTANCE, Dimension, Units
 
 if TYPE_CHECKING:
     from mbma_tables.contacts.quantities.state import State
@@ -171,6 +171,15 @@ def _declared_in_all(modules: tuple[str, ...]) -> Mapping[str, Quantity]:
 def results() -> list[str]:
     """Names of the quantities that pictures and sensitivities have without being asked."""
     return [name for name, declared in registry().items() if declared.is_result]
+
+
+def conductances() -> list[str]:
+    """Names of the conductances of heat, that of the whole interface first."""
+    return [
+        name
+        for name, declared in registry().items()
+        if declared.dimension == HEAT_CONDUCTANCE
+    ]
 
 
 def get(name: str) -> Quantity:

@@ -15,6 +15,7 @@ from xml.etree import ElementTree as ET
 from mbma_tables import __version__
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor
+from mbma_tables.contacts.quantities import registry
 from mbma_tables.export.code.language import AskedLaw
 from mbma_tables.export.code.law_code import MAX_NAME, asked_law, text_of
 from mbma_tables.export.exported_law import ExportedLaw
@@ -24,13 +25,6 @@ from mbma_tables.export.targets import CODE, Target
 from mbma_tables.export.text import checked_name, filled, inert, number
 from mbma_tables.surfaces.any_surface import AnySurface
 
-SAID = {
-    "solid_conductance": "of the solid spots (contact conductance), over nominal area",
-    "gas_conductance": "of the gas in the gaps (gap conductance), over nominal area",
-    "total_conductance": "of solid spots and gas (joint conductance), over nominal area",
-    "tangential_stiffness": "shear stress over displacement before any slip",
-    "leakage": "flow coefficient K: K dp/(12 viscosity width) per length of seal, viscosity in stress times s",
-}
 GLIBC = "2.17"  # of Linux distributions from 2014 on
 # by zig's names of platforms: folders in FMI 2.0, which has none of ARM, and ends of libraries
 PLATFORMS = {
@@ -187,12 +181,12 @@ def _variables(found: AskedLaw) -> list[dict[str, str]]:
     }
     asked |= {} if exported.ends else {"min": number(exported.c_least)}
     outputs = {
-        "pressure": (stress, "force over nominal area"),
+        "pressure": (stress, registry.get("pressure").meaning),
         "tangent": (f"{stress}/{length}", "derivative of pressure by overclosure"),
-        "area": ("1", "area of contact over nominal area"),
+        "area": ("1", registry.get("area").meaning),
         "energy": (f"{stress} {length}", "integral of pressure over overclosure"),
         **{
-            name: (function.unit, SAID.get(name, function.meaning))
+            name: (function.unit, function.meaning)
             for name, function in found.functions.items()
         },
     }

@@ -63,7 +63,8 @@ class Functions:
         """The flow coefficient of the gaps, on which the header has lines of its own."""
         unit = f"{self.exported.length}^3"
         curve = curve_of_flow(self.exported)
-        self._add_curve("leakage", unit, curve, "", "flow coefficient of the gaps")
+        meaning = registry.get("flow_coefficient").meaning
+        self._add_curve("leakage", unit, curve, "", meaning)
 
     def add(self, name: str) -> None:
         """Any quantity of the registry, unless it is there."""
