@@ -20,9 +20,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mbma_tables.bodies.bodies import BodiesInUnits
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.contacts.quantities import registry
+from mbma_tables.contacts.quantities.tangential import ratio_on
 from mbma_tables.contacts.question import GAPS
 from mbma_tables.contacts.result import Contact
 from mbma_tables.design.body_numbers import MODULI, POISSONS_RATIOS, BodyNumbers
@@ -93,8 +95,6 @@ class Described:
     theory: Theory
     by: str
     numbers: Mapping[str, Any]  # by name, with the quantity held fixed as the last
-    #: a modulus or Poisson's ratio, by name, that the ratio of stiffnesses alone has
-    ratio: tuple[str, float] | None = None
 
     @classmethod
     def of(
@@ -128,8 +128,6 @@ class Described:
     def asked(self, columns: Mapping[str, Any]) -> Asked:
         """The question at the gaps of columns of numbers."""
         bodies, interface = self.body_numbers.of_columns(columns)
-        if self.ratio is not None:
-            bodies = self.body_numbers.with_ratio(bodies, *self.ratio)
         return Asked(bodies, self.gap, columns[GAP], self.theory, interface)
 
     def contact(self) -> Contact:
@@ -252,7 +250,7 @@ def derivatives_of(
     difference = _Differences(described, asked, directions)
     table = difference.of(columns, values, scale)
     if "nu" in needs:
-        _add_ratio(described, table, asked, directions, columns)
+        _add_ratio(described, table, asked, directions, pressed)
     found = _at_given(table, len(names), bool(held))
     found_names = [name for name in varied if name != described.by] + [described.by]
     order = [found_names.index(name) for name in varied]
@@ -311,21 +309,47 @@ def _add_ratio(
     table: _Table,
     names: Sequence[str],
     directions: Sequence[str],
-    columns: Mapping[str, FloatArray],
+    pressed: Contact,
 ) -> None:
     """Add what moduli and Poisson's ratios change by the ratio of normal to tangential stiffness alone."""
     body = described.body_numbers
+    varied = [name for name in (*POISSONS_RATIOS, "nu", *MODULI) if name in directions]
+    if not varied:
+        return
     sheared = [k for k, name in enumerate(names) if "nu" in needs_of([name])]
-    own = [names[k] for k in sheared]
-    for name in {*MODULI, *POISSONS_RATIOS, "nu"} & set(directions):
+    shape = np.broadcast_shapes(described.shape, np.shape(pressed.pressure))
+    steps = {name: STEP * (abs(float(body.numbers[name])) or 1.0) for name in varied}
+
+    def both_ends(name: str) -> list[BodiesInUnits]:
+        """Bodies with a little more and a little less of a number."""
         number = float(body.numbers[name])
-        step = STEP * (abs(number) or 1.0)
-        ends = []
-        for sign in (1.0, -1.0):
-            ratio = (name, number + sign * step)
-            moved = dataclasses.replace(described, ratio=ratio)
-            ends.append(moved.answers(columns, own))
-        table.slopes[directions.index(name), sheared] += (ends[0] - ends[1]) / (2 * step)
+        return [
+            body.with_ratio(body.bodies, name, number + sign * steps[name])
+            for sign in (1.0, -1.0)
+        ]
+
+    def ratios(name: str) -> list[Any]:
+        """The ratios of stiffnesses at both ends."""
+        direction = body.interface.direction
+        return [
+            ratio_on(described.surface, bodies.bodies, direction, pressed.area)
+            for bodies in both_ends(name)
+        ]
+
+    gap = pressed.quantity(described.gap)
+    found = []
+    # a Poisson's ratio, which matters whatever the other numbers are
+    for bodies in both_ends(varied[0]):
+        asked = Asked(bodies, described.gap, gap, described.theory, body.interface)
+        contact = asked.contact(described.surface)
+        rows = [np.broadcast_to(contact.quantity(names[k]), shape) for k in sheared]
+        found.append(np.array(rows, dtype=float).reshape(len(sheared), -1))
+    more, less = ratios(varied[0])
+    by_ratio = (found[0] - found[1]) / np.ravel(np.broadcast_to(more - less, shape))
+    for name in varied:
+        more, less = ratios(name)
+        slope = np.ravel(np.broadcast_to((more - less) / (2 * steps[name]), shape))
+        table.slopes[directions.index(name), sheared] += by_ratio * slope
 
 
 @dataclasses.dataclass(frozen=True)
@@ -397,7 +421,11 @@ class _Differences:
         central = np.nonzero(sides == 0)
         ended = np.nonzero(sides)
         step = steps[central]
-        below, above = self._at_pairs(part, central, step, CENTRAL)
+        # a batch of spectra and one of them differ by more than rounding
+        with_base = self.described.unknowns.batches
+        (below, above), base = self._at_pairs(part, central, step, CENTRAL, with_base)
+        if with_base:
+            values = base
         table = _Table(
             np.empty((len(self.directions), *values.shape)),
             np.empty((len(self.directions), *values.shape)),
@@ -428,21 +456,29 @@ class _Differences:
         pairs: tuple[NDArray[np.intp], ...],
         step: FloatArray,
         offsets: Sequence[float],
-    ) -> FloatArray:
-        """Quantities where a direction of an entry is moved by multiples of its step: (offsets, quantities, pairs)."""
+        with_base: bool = False,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Quantities where a direction of an entry is moved by multiples of its step: (offsets, quantities, pairs).
+
+        Also the quantities of the entries as they are, by the same route, if asked for.
+        """
         place, entry = pairs
         count = place.size
         columns = {}
         for name, column in part.items():
-            columns[name] = np.tile(column[entry], len(offsets))
+            moved = np.tile(column[entry], len(offsets))
+            # the entries as they are, for second differences
+            columns[name] = np.concatenate([moved, column]) if with_base else moved
         for k, offset in enumerate(offsets):
             row = slice(k * count, (k + 1) * count)
             for direction in np.unique(place):
-                moved = place == direction
+                some = place == direction
                 name = self.directions[direction]
-                columns[name][row][moved] += offset * step[moved]
+                columns[name][row][some] += offset * step[some]
         found = self.described.answers(columns, self.names)
-        return found.reshape(len(self.names), len(offsets), count).swapaxes(0, 1)
+        size = count * len(offsets)
+        moved = found[:, :size].reshape(len(self.names), len(offsets), count)
+        return moved.swapaxes(0, 1), found[:, size:]
 
     def _one_sided(
         self,
@@ -454,7 +490,7 @@ class _Differences:
     ) -> None:
         """Write differences towards one side to the table."""
         signed = step * side
-        found = self._at_pairs(part, pairs, signed, ONE_SIDE)
+        found, _ = self._at_pairs(part, pairs, signed, ONE_SIDE)
         slope = np.tensordot(SIDE_WEIGHTS, found, 1) / signed
         simpler = np.tensordot(RIGHT_WEIGHTS, found[:3], 1) / signed
         size = np.abs(found).max(axis=0)
@@ -473,7 +509,7 @@ class _Differences:
         levels: int = LEVELS,
     ) -> None:
         """Write differences over finer and finer steps to the table, until they are those of a smooth function."""
-        found = self._at_pairs(part, pairs, step, BOTH_SIDES)
+        found, _ = self._at_pairs(part, pairs, step, BOTH_SIDES)
         size = np.abs(found).max(axis=0)
         slope = np.tensordot(FINE_WEIGHTS, found, 1) / step
         coarser = np.tensordot(MIDDLE_WEIGHTS, found[1:5], 1) / step
@@ -538,7 +574,7 @@ class _Differences:
         """Write slopes of polynomials over wide steps to the table, of values that are not smooth; NaN at jumps."""
         place, entry = pairs
         try:
-            found = self._at_pairs(part, pairs, step, MANY)
+            found, _ = self._at_pairs(part, pairs, step, MANY)
         except (InputError, ConvergenceError):
             found = np.full((len(MANY), *chosen.shape), np.nan)
         slope = np.tensordot(MANY_WEIGHTS, found, 1) / step

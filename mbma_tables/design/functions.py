@@ -212,7 +212,11 @@ class ContactFunction:
     ) -> FloatArray:
         """A function of what is described by x: in one batch, or entry by entry where no batch can be made."""
         columns = self._checked(x)
-        if columns.ndim == 1 or self.described.is_batched(self.numbers, self.quantities):
+        at_once = self.described.is_batched(self.numbers, self.quantities)
+        if at_once and columns.ndim == 1:
+            # a batch of one: one joint has a sampled spectrum, which differs by 1e-6
+            return function(self._moved(columns[None]))[0]
+        if at_once or columns.ndim == 1:
             return function(self._moved(columns))
         shape = columns.shape[:-1]
         rows = columns.reshape(-1, len(self.numbers))

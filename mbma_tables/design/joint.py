@@ -720,7 +720,7 @@ class Joint(JointQuantities, Displayed):
         for part, face in faces.items():
             # the nominal area determines the highest point of Gaussian heights
             fixed[part] = {
-                name: number
+                name: float(np.max(number))
                 for name, number in face.numbers.items()
                 if name in overridden
             }
@@ -744,7 +744,8 @@ class Joint(JointQuantities, Displayed):
                 surfaces.append(face.make(**own, **fixed[part]))
             return equivalent(surfaces, given.get("nominal_area"))
 
-        if alone and faces["part_a"].batches:
+        at_once = all(face.batches for face in faces.values())
+        if at_once and (alone or theory.takes_batches_of_spectra):
             return Unknowns(numbers, make, batches=True, one_sided=one_sided)
         # moduli, pressure and hardness are varied with the same surface
         return Unknowns(numbers, functools.cache(make), one_sided=one_sided)

@@ -156,11 +156,14 @@ def unknowns_of(
             "derivatives are of numbers or plain arrays, and this surface has DataArrays: "
             "give their values"
         )
-    if surface.shape != () and not isinstance(surface, Surface):
-        raise InputError("derivatives are of one spectrum, not of a batch of spectra")
-    drawn = _of_drawing(surface, unit)
+    drawn = _of_drawing(surface, theory, unit)
     if drawn is not None:
         return drawn
+    if surface.shape != () and not isinstance(surface, Surface):
+        raise InputError(
+            "derivatives of a batch of spectra are by numbers of drawings or of joints, of "
+            "which this one was not made: take one surface at a time"
+        )
     moved: Any = surface if unit in (None, surface.unit) else surface.to(unit or "")
     if isinstance(moved, Surface):
         own = {name: getattr(moved, name) for name in PARAMETERS}
@@ -174,7 +177,7 @@ def unknowns_of(
     return _of_spectrum(moved, theory)
 
 
-def _of_drawing(surface: Any, unit: str | None) -> Unknowns | None:
+def _of_drawing(surface: Any, theory: Theory | None, unit: str | None) -> Unknowns | None:
     """The numbers of the drawing, if the surface was made of these and not changed since."""
     record = surface.provenance[0] if surface.provenance else {}
     if record.get("step") != "from_roughness" or record["unit"] != surface.unit:
@@ -182,8 +185,8 @@ def _of_drawing(surface: Any, unit: str | None) -> Unknowns | None:
     drawn: Any = Surface.from_roughness(**record["given"], unit=record["unit"])
     if type(drawn) is not type(surface):
         return None
-    names = PARAMETERS if isinstance(surface, Surface) else ("q", "C", "h_max")
-    for name in names:
+    is_sampled = isinstance(surface, MeasuredSurface)
+    for name in ("q", "C", "h_max") if is_sampled else surface.parameters:
         before = getattr(drawn, name)
         now = getattr(surface, name)
         if np.shape(before) != np.shape(now) or not np.allclose(
@@ -198,7 +201,9 @@ def _of_drawing(surface: Any, unit: str | None) -> Unknowns | None:
     make = functools.partial(
         Surface.from_roughness, unit=unit or surface.unit, process=record.get("process")
     )
-    return Unknowns(numbers, make, batches=isinstance(surface, Surface))
+    is_power_law = isinstance(surface, Surface)
+    at_once = is_power_law or theory is None or theory.takes_batches_of_spectra
+    return Unknowns(numbers, make, batches=at_once)
 
 
 def _of_spectrum(surface: MeasuredSurface, theory: Theory | None) -> Unknowns:

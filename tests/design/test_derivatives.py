@@ -54,13 +54,26 @@ def surface_of(numbers, names):
     return Surface(**own, unit="um")
 
 
+BATCHED = tuple(
+    f"part_{end}.{name}"
+    for end in "ab"
+    for name in ("hurst", "Ra", "longest", "shortest")
+)
+
+
 def differences(ask, numbers, name, answers):
     """Relative slopes of answers by a number, of contacts that are described anew."""
-    values = []
-    for offset in OFFSETS:
-        moved = numbers | {name: float(numbers[name] * (1 + STEP * offset))}
-        pressed = ask(moved)
-        values.append([float(pressed.quantity(answer)) for answer in answers])
+    moved = [float(numbers[name] * (1 + STEP * offset)) for offset in OFFSETS]
+    if name.endswith(BATCHED):
+        # spectra of two faces of a batch are added as they are, those of one joint in samples
+        pressed = ask(numbers | {name: moved})
+        columns = [np.broadcast_to(pressed.quantity(answer), 8) for answer in answers]
+        values = np.transpose(columns)
+    else:
+        values = []
+        for number in moved:
+            pressed = ask(numbers | {name: number})
+            values.append([float(pressed.quantity(answer)) for answer in answers])
     here = ask(numbers)
     size = np.array([float(here.quantity(answer)) for answer in answers])
     return WEIGHTS @ np.array(values) / STEP / size
@@ -127,13 +140,20 @@ def test_every_number_of_a_drawing(yielding):
     assert_slopes(sensitivity(surface, bodies_of(numbers), **given), ask, numbers)
 
 
+def in_um(numbers):
+    """A text with its unit, or a list of these."""
+    if isinstance(numbers, list):
+        return [in_um(number) for number in numbers]
+    return f"{numbers!r} um"
+
+
 def joint_of(numbers):
     """A joint as one types it."""
     faces = [
         {
             "hurst": numbers[f"part_{end}.hurst"],
             **{
-                name: f"{numbers[f'part_{end}.{name}']!r} um"
+                name: in_um(numbers[f"part_{end}.{name}"])
                 for name in ("Ra", "longest", "shortest")
             },
         }
