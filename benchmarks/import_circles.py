@@ -15,7 +15,6 @@ import sys
 
 CALLS = ("import_module", "__import__")
 REGISTRIES = (
-    "mbma_tables.contacts.quantities.registry",
     "mbma_tables.export.targets",
     "generate.page",
 )

@@ -33,7 +33,7 @@ from mbma_tables.common.plots import (
 from mbma_tables.common.progress import shown as progress
 from mbma_tables.contacts.quantities import registry
 from mbma_tables.contacts.quantities.interface import NOTHING_BETWEEN, Gas, Interface
-from mbma_tables.contacts.quantities.state import State
+from mbma_tables.contacts.quantities.state import Need, State
 from mbma_tables.contacts.quantities.tangential import Tangential, sheared
 from mbma_tables.contacts.quantities.validity import (
     reasons_of_contact,
@@ -218,6 +218,10 @@ class Contact(State, Displayed):
         if uncertainty is None:
             return np.nan * self.mean_separation
         return self.quantity(uncertainty)
+
+    def missing(self, name: str) -> list[Need]:
+        """What a quantity needs and was not given."""
+        return registry.get(name).missing(self)
 
     def available(self) -> list[str]:
         """Names of the quantities for which everything needed was given."""

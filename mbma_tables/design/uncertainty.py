@@ -33,6 +33,7 @@ from mbma_tables.common.plots import Line, draw_panels, pressure_label
 from mbma_tables.common.progress import doing, shown
 from mbma_tables.contacts.contact import contact
 from mbma_tables.contacts.quantities import registry
+from mbma_tables.contacts.quantities.declaration import DIMENSIONLESS
 from mbma_tables.contacts.result import Contact, panel_label
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
@@ -103,7 +104,7 @@ def relative_scatter(pressed: Contact, name: str) -> Any:
     if declared.uncertainty is None or not declared.error_sign:
         return np.nan * pressed.mean_separation
     scatter = pressed.scatter_of(name)
-    if registry.get(declared.uncertainty).dimension != registry.DIMENSIONLESS:
+    if registry.get(declared.uncertainty).dimension != DIMENSIONLESS:
         with np.errstate(divide="ignore", invalid="ignore"):
             scatter = scatter / pressed.quantity(name)
     return declared.error_sign * scatter

@@ -22,7 +22,7 @@ from mbma_tables import (
     island,
     open_table,
 )
-from mbma_tables.contacts.quantities import registry
+from mbma_tables.contacts.quantities import declaration, registry
 from mbma_tables.design.scenes import plan as plans
 from mbma_tables.design.scenes import run as runs
 from mbma_tables.design.scenes.problem import ELASTIC, GROUPS, OTHERS
@@ -456,6 +456,6 @@ def test_validity_and_yield_are_what_the_declarations_of_quantities_say():
     yielded = {
         name
         for name, declared in registry.registry().items()
-        if declared.is_listed is registry.of_yielding_contacts
+        if declared.is_listed is declaration.of_yielding_contacts
     }
     assert {"yielded", "plane_separation", "psi"} <= yielded <= set(found.variables)

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import Numbers
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import HEAT_CONDUCTANCE, factor
+from mbma_tables.contacts.quantities.declaration import DIMENSIONLESS, quantity
 from mbma_tables.contacts.quantities.gas import (
     GASES,
     VACUUM,
@@ -18,8 +19,7 @@ from mbma_tables.contacts.quantities.gas import (
     scatter_of_mean,
 )
 from mbma_tables.contacts.quantities.interface import Gas
-from mbma_tables.contacts.quantities.registry import DIMENSIONLESS, Need, quantity
-from mbma_tables.contacts.quantities.state import State
+from mbma_tables.contacts.quantities.state import Need, State
 
 
 def _has_conductivity(contact: State) -> bool:

@@ -25,13 +25,17 @@ from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.plots import draw_compression, leakage_label, pressure_label
 from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.common.units import Dimension
+from mbma_tables.contacts.quantities.declaration import (
+    DIMENSIONLESS,
+    on_request,
+    quantity,
+)
 from mbma_tables.contacts.quantities.effective_medium import (
     LARGEST_AREA,
     FlowConstants,
     contact_factor,
     wide_gap,
 )
-from mbma_tables.contacts.quantities.registry import DIMENSIONLESS, on_request, quantity
 from mbma_tables.contacts.quantities.state import State
 from mbma_tables.contacts.quantities.validity import reasons_with_masks, valid_where_none
 from mbma_tables.core import core

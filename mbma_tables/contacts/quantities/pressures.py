@@ -6,7 +6,7 @@ import numpy as np
 
 from mbma_tables.bodies.materials import ELASTIC_PSI
 from mbma_tables.common.units import Dimension
-from mbma_tables.contacts.quantities.registry import (
+from mbma_tables.contacts.quantities.declaration import (
     DIMENSIONLESS,
     of_yielding_contacts,
     quantity,

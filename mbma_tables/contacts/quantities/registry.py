@@ -1,28 +1,21 @@
 """The registry of quantities: each is declared once, and whatever shows quantities iterates over them.
 
 A file of this folder declares a quantity, or a family that shares a formula, by decorating the
-function that computes it from the state of a contact; `MODULES` lists these files. Contacts, laws,
+function that computes it from the state of a contact (`declaration`); `MODULES` lists these files. Contacts, laws,
 joints, datasets and tables know of a quantity what its declaration has.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import importlib
 import types
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from collections.abc import Mapping
 
 from mbma_tables.common import units as of_arguments
 from mbma_tables.common.arguments import require_name
-from mbma_tables.common.errors import MissingError
-from mbma_tables.common.units import HEAT_CONDUCTANCE, Dimension, Units
-
-if TYPE_CHECKING:
-    from mbma_tables.contacts.quantities.state import State
+from mbma_tables.common.units import HEAT_CONDUCTANCE, Units
+from mbma_tables.contacts.quantities.declaration import Quantity
 
 #: modules that declare quantities, in the order in which these are shown
 MODULES = [
@@ -33,109 +26,6 @@ MODULES = [
     "mbma_tables.contacts.quantities.leakage",
     "mbma_tables.contacts.quantities.uncertainty",
 ]
-DIMENSIONLESS = Dimension()
-
-
-@dataclasses.dataclass(frozen=True)
-class Need:
-    """What a user must give for some quantities."""
-
-    name: str  # such as "conductivity"
-    is_given: Callable[[State], bool]
-    remedy: str  # how to give it
-
-
-def of_all_contacts(state: State) -> bool:
-    """Whether a quantity is listed: of every contact."""
-    return True
-
-
-def on_request(state: State) -> bool:
-    """Whether a quantity is listed: of no contact."""
-    return False
-
-
-def of_yielding_contacts(state: State) -> bool:
-    """Whether a quantity is listed: of contacts with a hardness, since others have it under another name or as 0."""
-    return state.yields
-
-
-@dataclasses.dataclass(frozen=True)
-class Quantity:
-    """Declaration of a quantity, all that anyone who shows it needs to know."""
-
-    name: str
-    dimension: Dimension
-    meaning: str  # one phrase, for attributes of datasets, help texts, and tooltips
-    notes: str  # docstring of the function that computes it
-    compute: Callable[[State], Any]
-    needs: tuple[Need, ...] = ()
-    #: names of the quantities that it is computed from, whose needs are needs of its own
-    made_of: tuple[str, ...] = ()
-    #: name of the quantity that holds its model uncertainty, None where it has none of its own
-    uncertainty: str | None = None
-    #: sign of the model's error at a pressure where that of the area is positive; 0 where its
-    #: uncertainty is not one at a pressure
-    error_sign: int = 1
-    is_column: bool = True  # whether tables in a terminal have it
-    # whether datasets and tables have it without being asked: not where it takes a further
-    # simulation, nor of contacts of which it says nothing new
-    is_listed: Callable[[State], bool] = of_all_contacts
-    unit_of_state: Callable[[State], str] | None = (
-        None  # where the unit depends on what the user gave
-    )
-
-    @property
-    def is_result(self) -> bool:
-        """Whether pictures and sensitivities have it without being asked: columns with a model uncertainty."""
-        return self.is_column and self.uncertainty is not None
-
-    def missing(self, state: State) -> list[Need]:
-        """What it needs and was not given, for itself or for the quantities that it is made of."""
-        missing = [need for need in self.needs if not need.is_given(state)]
-        for name in self.made_of:
-            missing += [need for need in get(name).missing(state) if need not in missing]
-        return missing
-
-    def is_available(self, state: State) -> bool:
-        """Whether a contact has it: all it needs is given."""
-        return not self.missing(state)
-
-    def is_shown(self, state: State) -> bool:
-        """Whether a contact shows it without being asked."""
-        return self.is_available(state) and self.is_listed(state)
-
-    def of(self, state: State) -> Any:
-        """Its value, or an error that names what is missing."""
-        if missing := self.missing(state):
-            remedies = "; ".join(dict.fromkeys(need.remedy for need in missing))
-            names = " and ".join(need.name for need in missing)
-            raise MissingError(f"{self.name} needs {names}, which is missing: {remedies}")
-        # ratios may be infinite or undefined where bodies do not touch
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return self.compute(state)
-
-    def unit(self, state: State) -> str:
-        """Its unit in a contact."""
-        if self.unit_of_state is not None and not self.missing(state):
-            return self.unit_of_state(state)
-        return self.dimension.unit(state.unit_system)
-
-    def unit_in(self, units: Units) -> str:
-        """Its unit beside lengths and stresses in `units`."""
-        return self.dimension.unit(units)
-
-
-def quantity(
-    dimension: Dimension, meaning: str, **declared: Any
-) -> Callable[[Callable[[State], Any]], Quantity]:
-    """Decorator: declare the quantity that a function of the state of a contact computes, under the function's name."""
-
-    def declare(compute: Callable[[State], Any]) -> Quantity:
-        notes = compute.__doc__ or meaning
-        return Quantity(compute.__name__, dimension, meaning, notes, compute, **declared)
-
-    return declare
 
 
 @functools.cache

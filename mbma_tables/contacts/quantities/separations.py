@@ -3,7 +3,7 @@
 from typing import Any
 
 from mbma_tables.common.units import Dimension
-from mbma_tables.contacts.quantities.registry import of_yielding_contacts, quantity
+from mbma_tables.contacts.quantities.declaration import of_yielding_contacts, quantity
 from mbma_tables.contacts.quantities.state import State
 
 LENGTH = Dimension(length=1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import dataclasses
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,15 @@ if TYPE_CHECKING:
     from mbma_tables.bodies.bodies import BodiesInUnits
     from mbma_tables.surfaces.any_surface import AnySurface
     from mbma_tables.theories.base import Theory, TheoryAnswer
+
+
+@dataclasses.dataclass(frozen=True)
+class Need:
+    """What a user must give for some quantities."""
+
+    name: str  # such as "conductivity"
+    is_given: Callable[[State], bool]
+    remedy: str  # how to give it
 
 
 class State(ContactQuantities, abc.ABC):
@@ -56,6 +66,10 @@ class State(ContactQuantities, abc.ABC):
     @abc.abstractmethod
     def quantity(self, name: str) -> Any:
         """A quantity by its name, computed when it is first asked for."""
+
+    @abc.abstractmethod
+    def missing(self, name: str) -> list[Need]:
+        """What a quantity needs and was not given."""
 
     @abc.abstractmethod
     def evaluate(

@@ -3,8 +3,11 @@
 from typing import Any
 
 from mbma_tables.common.units import Dimension
-from mbma_tables.contacts.quantities.registry import Need, of_yielding_contacts, quantity
-from mbma_tables.contacts.quantities.state import State
+from mbma_tables.contacts.quantities.declaration import (
+    of_yielding_contacts,
+    quantity,
+)
+from mbma_tables.contacts.quantities.state import Need, State
 from mbma_tables.contacts.quantities.tangential import tangential_ratio_of
 
 STIFFNESS = Dimension(stress=1, length=-1)

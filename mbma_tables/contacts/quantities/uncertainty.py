@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.common.units import Dimension
-from mbma_tables.contacts.quantities.registry import DIMENSIONLESS, quantity
+from mbma_tables.contacts.quantities.declaration import DIMENSIONLESS, quantity
 from mbma_tables.contacts.quantities.state import State
 
 

@@ -19,7 +19,8 @@ from mbma_tables.common.arguments import (
 )
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, modulus_and_units, require_surface
-from mbma_tables.contacts.quantities.registry import of_all_contacts, registry
+from mbma_tables.contacts.quantities.declaration import of_all_contacts
+from mbma_tables.contacts.quantities.registry import registry
 from mbma_tables.contacts.question import Question, name_of_the_given
 from mbma_tables.islands.island_models import ISLAND_MODELS, AnyModel
 from mbma_tables.islands.variants import Variant, get_variant

@@ -20,11 +20,8 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.plots import Curve, theory_label
 from mbma_tables.common.progress import doing
-from mbma_tables.contacts.quantities.registry import (
-    of_yielding_contacts,
-    registry,
-    unit_of,
-)
+from mbma_tables.contacts.quantities.declaration import of_yielding_contacts
+from mbma_tables.contacts.quantities.registry import registry, unit_of
 from mbma_tables.design.scenes.plan import AMPLIFICATION, TABLES, Plan, Step
 from mbma_tables.design.scenes.problem import Problem
 from mbma_tables.islands.island_models import RigidModel, answer_islands

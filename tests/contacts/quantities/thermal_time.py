@@ -1,7 +1,7 @@
 """Quantities that someone adds: one file in which they are declared."""
 
 from mbma_tables.common.units import Dimension
-from mbma_tables.contacts.quantities.registry import quantity
+from mbma_tables.contacts.quantities.declaration import quantity
 
 HEAT_CAPACITY = 3.7e6  # of a layer, per volume [J/(m^3 K)]
 THICKNESS = 1e-3  # [m]
