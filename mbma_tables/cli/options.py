@@ -22,7 +22,8 @@ from mbma_tables.islands.variants import NAMED
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import ROUGHNESS
 from mbma_tables.surfaces.self_affine import CASES
-from mbma_tables.theories import OF_MAPS, THEORIES
+from mbma_tables.theories import THEORIES
+from mbma_tables.theories.named import OF_MAPS
 from mbma_tables.theories.simulated.grids import GRIDS
 
 LOADS = ("separation", "mean_separation", "pressure", "area")

@@ -75,15 +75,9 @@ from mbma_tables.islands.island_models import beside
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import TOPS
 from mbma_tables.surfaces.surface import Surface, assumptions
-from mbma_tables.theories import (
-    OF_MAPS,
-    THEORIES,
-    is_table,
-    options_of,
-    resolve,
-    theory_text,
-)
+from mbma_tables.theories import THEORIES, is_table, resolve, theory_text
 from mbma_tables.theories.base import Theory
+from mbma_tables.theories.named import OF_MAPS, options_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-import dataclasses
 import importlib
 import reprlib
 import types
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
-from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.shared import shared
+from mbma_tables.theories.named import (
+    NAMED,
+    OF_MAPS,
+    THEORIES,
+    class_of,
+    options_of,
+    shipped,
+)
 
 if TYPE_CHECKING:
     from mbma_tables.islands.variants import Variant as Variant
@@ -43,20 +48,10 @@ __all__ = [
     "resolve",
 ]
 
-# the shipped theories: modules and classes by name; their fields are their options
-_NAMED = {
-    "mbma": ("mbma.theory", "Mbma"),
-    "calibrated": ("calibrated.theory", "Calibrated"),
-    "persson": ("persson", "Persson"),
-    "greenwood_williamson": ("greenwood_williamson", "GreenwoodWilliamson"),
-    "simulated": ("simulated.theory", "Simulated"),
-}
-OF_MAPS = ("simulated",)  # theories of one map, made by simulating it
-THEORIES = tuple(name for name in _NAMED if name not in OF_MAPS)
 NONE: Mapping[str, Any] = types.MappingProxyType({})
 # a theory's module is imported when first needed
 _HOMES = {
-    **{made: module for module, made in _NAMED.values()},
+    **{made: module for module, made in NAMED.values()},
     "Variant": ".islands.variants",
     "Method": "persson",
     "BoundaryElements": "simulated.one_map",
@@ -113,8 +108,8 @@ def resolve(
     chosen: Any = theory
     if chosen is None and surface is not None:
         chosen = default_name(surface, given_name, options)
-    if isinstance(chosen, str) and chosen in _NAMED:
-        chosen = _with_options(chosen, options) if options else _shipped(chosen)
+    if isinstance(chosen, str) and chosen in NAMED:
+        chosen = _with_options(chosen, options) if options else shipped(chosen)
     elif is_table(chosen) and not options:
         chosen = __getattr__("Tabulated")(chosen)
     elif options:
@@ -146,12 +141,6 @@ def is_table(theory: Any) -> bool:
     return isinstance(theory, str) and theory.endswith(".nc")
 
 
-@shared()
-def _shipped(name: str) -> Any:
-    """A shipped theory with its defaults, made once per process."""
-    return _class_of(name)()
-
-
 def _of_object(chosen: Any, surface: Any) -> Theory:
     """A simulation of a surface's map or a user's object as a theory; other objects are refused."""
     from mbma_tables.theories.base import Theory, UserTheory
@@ -177,24 +166,13 @@ def _with_options(name: str, options: Mapping[str, Any]) -> Any:
     """A shipped theory with options; those that it does not have are refused."""
     others = [option for option in options if option not in options_of(name)]
     if others:
-        owners = [other for other in _NAMED if others[0] in options_of(other)]
+        owners = [other for other in NAMED if others[0] in options_of(other)]
         owner = f"theory {owners[0]!r} alone" if owners else "no theory"
         known = ", ".join(options_of(name)) or "none"
         raise InputError(
             f"{', '.join(others)}: options of {owner}, not of {name!r}, which has {known}"
         )
-    return _class_of(name)(**options)
-
-
-def options_of(name: str) -> list[str]:
-    """Names of the options of a shipped theory; an error for an unknown name."""
-    require_name("theory", name, _NAMED)
-    return [field.name for field in dataclasses.fields(_class_of(name))]
-
-
-def _class_of(name: str) -> Any:
-    """The class of a shipped theory."""
-    return __getattr__(_NAMED[name][1])
+    return class_of(name)(**options)
 
 
 def default_name(
@@ -232,7 +210,7 @@ def default_name(
     ('calibrated', 'mbma', 'mbma')
     """
     for option in options:
-        for name in _NAMED:
+        for name in NAMED:
             if option in options_of(name):
                 return name
     if given_name == "separation":

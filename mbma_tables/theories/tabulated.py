@@ -16,8 +16,8 @@ from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.tables.function_table import FunctionTable, read_function_table
-from mbma_tables.theories import THEORIES, resolve, totals
 from mbma_tables.theories.base import Theory, TheoryAnswer
+from mbma_tables.theories.named import THEORIES, shipped
 
 AXES = (
     ("hurst", "zeta_1", "h_max", "compression"),
@@ -26,6 +26,8 @@ AXES = (
 )
 NODES, INTERVALS = 8, 16  # of the integral of the pressure
 OUTPUTS = ("pressure", "area")
+# module of the functions that shipped theories are tabulated by
+TOTALS = "mbma_tables.theories.totals"
 NO_SCATTER = "the scatter of the theory that this table stands for is not known: it is one of a user"
 
 
@@ -85,7 +87,9 @@ class Tabulated(Theory):
     def stands_for(self) -> Theory | None:
         """The shipped theory whose totals these are; None for one of a user."""
         module, _, name = self.contents.attributes["function"].partition(":")
-        return resolve(name) if module == totals.__name__ and name in THEORIES else None
+        is_shipped = module == TOTALS and name in THEORIES
+        theory: Theory | None = shipped(name) if is_shipped else None
+        return theory
 
     @property
     def ends_at_h_max(self) -> bool:  # type: ignore[override]

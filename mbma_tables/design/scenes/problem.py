@@ -27,16 +27,10 @@ from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.tables.island4d import Island4dModel
 from mbma_tables.tables.universal import UniversalModel
-from mbma_tables.theories import (
-    OF_MAPS,
-    THEORIES,
-    default_name,
-    is_table,
-    options_of,
-    resolve,
-)
+from mbma_tables.theories import THEORIES, default_name, is_table, resolve
 from mbma_tables.theories.base import Theory
 from mbma_tables.theories.mbma.models import with_table
+from mbma_tables.theories.named import OF_MAPS, options_of
 
 # effects, described in docs/scenes.md, beside the quantities of the registry, each of which
 # is an effect of its name: several quantities of a contact under one name, and others

@@ -27,9 +27,10 @@ from mbma_tables.islands.variants import FITTED, PRINTED, REPORTED, get_variant
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.tables.open import universal_model
-from mbma_tables.theories import OF_MAPS, default_name, options_of, tested
+from mbma_tables.theories import default_name, tested
 from mbma_tables.theories.evidence import COMPARED, QUANTITIES, shipped_deviations
 from mbma_tables.theories.mbma import theory as mbma
+from mbma_tables.theories.named import OF_MAPS, options_of
 from mbma_tables.theories.yielding import formulas as hardness_law
 
 MODULE = "explorer.wasm"
