@@ -22,6 +22,7 @@ from mbma_tables.common.arguments import (
     positive_array,
     require_fields,
 )
+from mbma_tables.common.distributions import distributions_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import (
     Units,
@@ -96,6 +97,9 @@ class Bodies:
         for name, value in vars(self).items():
             if type(value) not in UNCHANGING:
                 object.__setattr__(self, name, detached(value))
+        given = self.E is not None or self.nu is not None
+        if given and any(distributions_in((self.E, self.nu))):
+            return  # what follows from them is that of drawn numbers
         if self.metals is not None:
             self._take_metals()
         elif self.E is not None:

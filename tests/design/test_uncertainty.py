@@ -237,6 +237,28 @@ def test_a_contact_of_a_surface_has_the_same_quantiles_as_its_joint():
     np.testing.assert_allclose(alone.quantiles["area"], together.quantiles["area"])
 
 
+def test_moduli_and_ratios_of_poisson_may_be_ranges():
+    face = FACE | {"Ra": "0.4 um"}
+    E = ("200..220 GPa", "70 GPa +- 1 GPa")
+    bodies = Bodies(E=E, nu=("0.28..0.3", 0.33), hardness="1 GPa")
+    joint = Joint(face, bodies=bodies, nominal_area="4 cm^2", gas="vacuum")
+    assert [*joint.inputs] == ["bodies.nu.0", "bodies.E.0", "bodies.E.1"]
+    names = ["tangential_stiffness"]
+    found = joint.uncertainty(PRESSURE, draws=100, quantities=names)
+    drawn = []
+    for replica in joint.replicas(100):
+        numbers = [replica.inputs[f"bodies.E.{k}"] for k in (0, 1)]
+        nu = (replica.inputs["bodies.nu.0"], 0.33)
+        own = Bodies(E=tuple(numbers), nu=nu, hardness="1 GPa")
+        one = Joint(face, bodies=own, nominal_area="4 cm^2", gas="vacuum")
+        pressed = one.at_pressure(PRESSURE)
+        scatter = pressed.unloading_stiffness_scatter
+        drawn.append(pressed.tangential_stiffness * np.exp(replica.model * scatter))
+    np.testing.assert_allclose(
+        found.quantiles[names[0]][:, 0], np.quantile(drawn, found.levels), rtol=1e-9
+    )
+
+
 def test_parts_of_different_bands_are_drawn_one_after_the_other():
     other = FACE | {"Ra": "0.8 um", "longest": "400..600 um"}
     joint = Joint(
