@@ -243,30 +243,8 @@ stress_unit_option = _option(
     "stress_unit", "Unit of plain moduli and of the answer, such as MPa.", metavar="UNIT"
 )
 
-_SPECIMEN_OPTIONS = (
-    _option(
-        "surface",
-        f"Surface: a case of the paper, {', '.join(CASES)}.",
-        type=click.Choice([*CASES]),
-        metavar="NAME",
-    ),
-    _option("file", "Surface: a TOML file.", type=PATH, metavar="TOML"),
-    _option("map", "Surface: a measured map or line scan.", type=PATH, metavar="MAP"),
-    *_MAP_OPTIONS,
-    _option(
-        "model",
-        "Of a map: its own spectrum, or five numbers.",
-        type=click.Choice(("measured", "self-affine")),
-    ),
-    _option("hurst", "Surface in numbers: Hurst exponent, in (0, 1].", type=float),
-    _option("q0", "Smallest wavenumber [1/length]."),
-    _option("q1", "Largest wavenumber [1/length]; or give --zeta-1."),
-    _option("zeta_1", "Largest magnification q1/q0, above 3.", type=float),
-    _option("h_rms", "Root-mean-square height [length]."),
-    _option("h_max", "Highest point above the mid-plane [length]."),
-    _option("m0", "Surface by moments: hurst, h_max, variance of height [length^2],"),
-    _option("m2", "variance of a profile's slope,", type=float),
-    _option("m4", "variance of a profile's second derivative [1/length^2]."),
+# of a drawing, besides the Hurst exponent
+_ROUGHNESS_OPTIONS = (
     _option(
         "Rq", "Surface by a drawing: rms height of a profile [length], with hurst, h_max,"
     ),
@@ -292,6 +270,32 @@ _SPECIMEN_OPTIONS = (
         "What made the face, such as milled: whether results are valid depends on it.",
         metavar="NAME",
     ),
+)
+_SPECIMEN_OPTIONS = (
+    _option(
+        "surface",
+        f"Surface: a case of the paper, {', '.join(CASES)}.",
+        type=click.Choice([*CASES]),
+        metavar="NAME",
+    ),
+    _option("file", "Surface: a TOML file.", type=PATH, metavar="TOML"),
+    _option("map", "Surface: a measured map or line scan.", type=PATH, metavar="MAP"),
+    *_MAP_OPTIONS,
+    _option(
+        "model",
+        "Of a map: its own spectrum, or five numbers.",
+        type=click.Choice(("measured", "self-affine")),
+    ),
+    _option("hurst", "Surface in numbers: Hurst exponent, in (0, 1].", type=float),
+    _option("q0", "Smallest wavenumber [1/length]."),
+    _option("q1", "Largest wavenumber [1/length]; or give --zeta-1."),
+    _option("zeta_1", "Largest magnification q1/q0, above 3.", type=float),
+    _option("h_rms", "Root-mean-square height [length]."),
+    _option("h_max", "Highest point above the mid-plane [length]."),
+    _option("m0", "Surface by moments: hurst, h_max, variance of height [length^2],"),
+    _option("m2", "variance of a profile's slope,", type=float),
+    _option("m4", "variance of a profile's second derivative [1/length^2]."),
+    *_ROUGHNESS_OPTIONS,
     _option(
         "E_star",
         "Effective modulus; export needs one, elsewhere forces are over E* without it.",
@@ -305,6 +309,18 @@ _SPECIMEN_OPTIONS = (
 )
 map_options = option_group("treatment", given_values, *_MAP_OPTIONS, length_unit("unit"))
 specimen_options = option_group("specimen", specimen_of, *_SPECIMEN_OPTIONS)
+# of a joint of one rough face, in place of its file
+face_options = option_group(
+    "face",
+    given_values,
+    _option("hurst", "Without a file, the rough face in numbers: Hurst exponent,"),
+    *_ROUGHNESS_OPTIONS,
+    click.option(
+        "--bodies",
+        metavar="NAME[,NAME]",
+        help="Metals of both parts, or the effective modulus.",
+    ),
+)
 
 
 def _pair(ctx: click.Context, param: click.Parameter, given: str | None) -> Any:

@@ -22,6 +22,7 @@ from mbma_tables.cli.format import (
 from mbma_tables.cli.options import (
     Output,
     check_plot,
+    face_options,
     file_options,
     given_values,
     json_option,
@@ -33,7 +34,7 @@ from mbma_tables.cli.options import (
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import MAX_BYTES, read_file, write_file, written_bytes
 from mbma_tables.common.progress import echo
-from mbma_tables.common.toml_files import read_toml, with_settings
+from mbma_tables.common.toml_files import read_toml, set_entry, with_settings
 from mbma_tables.export.targets import Options
 from mbma_tables.export.text import written_by
 from mbma_tables.surfaces.surface import assumptions
@@ -133,21 +134,41 @@ def _flag(name: str) -> str:
     return "--without-heat" if name == "heat" else f"--{name.replace('_', '-')}"
 
 
-def _joint(file: Path | None, settings: tuple[str, ...]) -> Joint:
-    """The joint of a file, of settings, or of both."""
-    from mbma_tables.design.joint import Joint
-
-    if file is None and not settings:
+def _entries(
+    file: Path | None, settings: tuple[str, ...], face: dict[str, Any]
+) -> dict[str, Any]:
+    """Entries of a joint: of a file, of the options of a face, and settings in place of them."""
+    if file is not None and face:
         raise InputError(
-            "a joint is needed: its FILE, or its numbers by --set NAME=VALUE"
+            f"{', '.join(_flag(name) for name in face)} are of a joint without a file: "
+            "--set changes entries of the file"
         )
     entries = {} if file is None else read_toml(file, "joint")
-    path = Path("--set") if file is None else file
-    return Joint.from_entries(with_settings(entries, settings), path)
+    for name, value in face.items():
+        if name == "bodies":
+            names = [each.strip() for each in value.split(",")]
+            entries[name] = names[0] if len(names) == 1 else names
+        else:
+            set_entry(
+                entries, name if name == "nominal_area" else f"part_a.{name}", value
+            )
+    if not entries and not settings:
+        raise InputError(
+            "a joint is needed: its FILE, or --Ra and other numbers of a face with "
+            "--nominal-area and --bodies, or --set NAME=VALUE"
+        )
+    return with_settings(entries, settings)
+
+
+def _joint(file: Path | None, entries: dict[str, Any]) -> Joint:
+    """The joint of entries, which are those of a file or of options."""
+    from mbma_tables.design.joint import Joint
+
+    return Joint.from_entries(entries, Path("options") if file is None else file)
 
 
 def _export_joint(
-    file: Path | None, settings: tuple[str, ...], out: Path, target: str, **options: Any
+    file: Path | None, entries: dict[str, Any], out: Path, target: str, **options: Any
 ) -> None:
     """Write the joint of a file for another program."""
     made_by = [written_by(click.get_current_context().obj[1:], "joint")]
@@ -155,7 +176,7 @@ def _export_joint(
         digest = hashlib.sha256(read_file(file, MAX_BYTES)).hexdigest()
         made_by.insert(0, f"input {file}: sha256 {digest}")
     request = Options(**options, made_by=tuple(made_by))
-    write_export(_joint(file, settings).subject(), target, request, out)
+    write_export(_joint(file, entries).subject(), target, request, out)
 
 
 _joint_options = option_group(
@@ -293,6 +314,7 @@ def _report_of_ranges(
 )
 @click.argument("file", type=click.Path(path_type=Path), required=False)
 @settings_option
+@face_options
 @numbers_option(
     "--pressure",
     "-p",
@@ -319,6 +341,7 @@ def _report_of_ranges(
 def joint_command(
     file: Path | None,
     settings: tuple[str, ...],
+    face: dict[str, Any],
     pressure: list[float | str] | None,
     force: tuple[str, ...],
     plot: Path | None,
@@ -331,8 +354,8 @@ def joint_command(
 
     Numbers may be ranges, '0.25..2.5 mm', or means with a deviation, '1.6 um +- 0.2 um':
     the table then has the median of each quantity and its quantiles 5% and 95%, and lines
-    above it the shares of inputs. --set changes entries of the file, or makes a joint
-    without one.
+    above it the shares of inputs. --set changes entries of the file. Without a file, --Ra
+    and other numbers are those of one rough face.
 
     With --export the joint is written for another program instead, with conductance of
     solid spots and gas: any target of `mbma export` that takes a law.
@@ -342,9 +365,13 @@ def joint_command(
     Example: mbma joint examples/joint.toml --export abaqus --pressures 1MPa:50MPa --name
     JOINT --out joint.inp
 
+    Example: mbma joint --Ra '1.6 um +- 0.2 um' --hurst 0.8 --longest 0.8mm --shortest 8um
+    --nominal-area 4cm^2 --bodies 'steel 1020' --pressure 10MPa
+
     Example: mbma joint examples/joint.toml --set part_a.longest='0.25..0.8 mm' --pressure 10MPa
     """
     export |= asked
+    entries = _entries(file, settings, face)
     if "target" in export:
         if pressure or force or plot is not None or output.as_json or output.as_csv:
             raise InputError(
@@ -352,7 +379,7 @@ def joint_command(
             )
         if output.out is None:
             raise InputError("--export needs --out, the file to write")
-        _export_joint(file, settings, output.out, **export)
+        _export_joint(file, entries, output.out, **export)
         return
     if export:
         raise InputError(
@@ -363,8 +390,8 @@ def joint_command(
             "pressures or forces are needed: --pressure or --force; or --export TARGET"
         )
     check_plot(plot, output.out)
-    joint = _joint(file, settings)
-    title = "joint of --set" if file is None else file.name
+    joint = _joint(file, entries)
+    title = "joint of options" if file is None else file.name
     pressures = pressure or [joint.pressure_of(each) for each in force]
     if joint.inputs:
         report = _report_of_ranges(joint, pressures, title, drawn)

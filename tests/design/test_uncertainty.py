@@ -440,11 +440,25 @@ def test_settings_stand_for_entries_of_the_file_or_for_a_file():
     assert rougher != run("joint", EXAMPLE, *export)
 
 
+def test_options_of_a_face_stand_for_a_file():
+    numbers = {"Ra": "0.4 um +- 0.04 um", "hurst": "0.75..0.85"}
+    band = {"longest": "500um", "shortest": "8um"}
+    words = [w for name, text in (numbers | band).items() for w in (f"--{name}", text)]
+    words += ["--nominal-area", "4cm^2", "--bodies", ", ".join(METALS)]
+    printed = json.loads(run("joint", *words, "-p", PRESSURE, "--json"))
+    joint = Joint(numbers | band, bodies=METALS, nominal_area="4 cm^2")
+    found = joint.uncertainty(PRESSURE)
+    assert printed["columns"]["area_low"] == found.quantiles["area"][0].tolist()
+    assert printed["columns"]["valid"] == ["yes"]
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["-p", PRESSURE], "a joint is needed: its FILE, or its numbers by --set"),
+        (["-p", PRESSURE], "a joint is needed: its FILE, or --Ra"),
         ([EXAMPLE, "--set", "part_a.Rq", "-p", "1MPa"], "settings are NAME=VALUE"),
+        ([EXAMPLE, "--Ra", "1um", "-p", "1MPa"], "--Ra are of a joint without a file"),
+        (["--Ra", "1um", "-p", "1MPa"], "argument: 'bodies'"),
         ([EXAMPLE, "--set", "gas.name=air", "-p", "1MPa"], "'gas' is no table"),
         ([EXAMPLE, "--set", "part_a.Rz=1 um", "-p", "1MPa"], "no argument 'Rz'"),
         ([EXAMPLE, "--seed", "1", "-p", "1MPa"], "--seed are of a joint with ranges"),
