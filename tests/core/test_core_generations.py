@@ -21,7 +21,7 @@ QUICK = [
 ]
 QUICK += [
     "theories/mbma/test_kernel.py",
-    "law/test_law.py",
+    "contacts/law/test_law.py",
     "islands/test_island_models.py",
 ]
 MORE = [

@@ -269,6 +269,8 @@ def test_the_command_exports_and_checks_a_table_of_four_numbers(four, tmp_path):
     assert result.exit_code == 0, result.output
     assert "lookup: 64 points" in result.stdout
     header = (tmp_path / "c" / "mbma_model.h").read_text()
+    words = " ".join(header.replace("\n *", " ").split())
+    assert f"mbma export c --table {four[0]} --variant reported --out ." in words
     assert "mbma_lookup_of" in header
     assert "mbma_phi_of" not in header
 

@@ -3,6 +3,8 @@
 import json
 import os
 import pickle
+import shutil
+import subprocess
 
 import numpy as np
 import pytest
@@ -22,6 +24,7 @@ from mbma_tables import (
 from mbma_tables.cli import main
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.design.scenes.plan import certified_error
+from mbma_tables.export.model.c_code import write_code
 from mbma_tables.export.page.explorer import explorer_page
 from mbma_tables.tables.open import open_table
 from mbma_tables.tables.schema import KINDS
@@ -159,9 +162,36 @@ def by_plan(table, folder):
     return found["pressure"].values[0]
 
 
+PROGRAM = """
+#include <stdio.h>
+#include "mbma_model.h"
+int main(void)
+{
+    const mbma_surface surface = {0.8, 1.0, 30.0, 1.0, 3.0};
+    mbma_contact found;
+    if (mbma_total_of(&surface, 2.0, 1.0, 1e-8, &found) != MBMA_OK)
+        return 1;
+    return printf("%.17g", found.force) < 0;
+}
+"""
+
+
+def by_c(table, folder):
+    if shutil.which("cc") is None:
+        pytest.skip("no C compiler")
+    written = write_code(folder, table=table)
+    (folder / "own.c").write_text(PROGRAM)
+    sources = [path.name for path in written if path.suffix == ".c"]
+    sources.remove("mbma_selftest.c")
+    command = ["cc", "own.c", *sources, "-lm", "-o", "own"]
+    subprocess.run(command, cwd=folder, check=True)
+    done = subprocess.run(["./own"], cwd=folder, check=True, capture_output=True)
+    return float(done.stdout)
+
+
 ROUTES = [
     *(by_contact, by_many, by_law, by_scene, by_scene_file, by_command, by_island),
-    *(by_joint, by_joint_file, by_joint_command, by_sensitivity, by_plan),
+    *(by_joint, by_joint_file, by_joint_command, by_sensitivity, by_plan, by_c),
 ]
 
 

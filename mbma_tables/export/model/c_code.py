@@ -111,14 +111,17 @@ def core_texts(names: Iterable[str] = CORE) -> dict[str, str]:
     return dict(sorted(texts.items()))
 
 
-def source_texts(model: IslandTable, variant: Variant) -> dict[str, str]:
-    """Names and texts of the source files."""
+def source_texts(
+    model: IslandTable, variant: Variant, table: os.PathLike[str] | str | None = None
+) -> dict[str, str]:
+    """Names and texts of the source files; `table` is where the model was read."""
     if variant.addition != "sum":
         raise InputError(
             f"exported code adds the areas of islands: variant {variant.name!r} takes their cover"
         )
     heads = {
-        name: opening(header(name, model, variant), "/*") for name in (*MODEL, SELFTEST)
+        name: opening(header(name, model, variant, table), "/*")
+        for name in (*MODEL, SELFTEST)
     }
     is_of_four = isinstance(model, Island4dModel)
     texts = (
@@ -287,12 +290,18 @@ def _cells(cells: FloatArray) -> Iterator[str]:
             )
 
 
-def header(name: str, model: IslandTable, variant: Variant) -> list[str]:
+def header(
+    name: str,
+    model: IslandTable,
+    variant: Variant,
+    table: os.PathLike[str] | str | None = None,
+) -> list[str]:
     """Paragraphs of a file's opening comment: origin, contents, variant, range, errors, conventions, licence."""
     content = model.content
     law = calibrated_table.shipped()
     found = content.attributes
     sources = " ".join(core_sources(model))
+    of_table = [] if table is None else ["--table", os.fspath(table)]
     worst, visited = (
         max(float(found[f"{which}largest_error_{of}"]) for of in ("F", "A"))
         for which in ("", "visited_")
@@ -328,7 +337,7 @@ def header(name: str, model: IslandTable, variant: Variant) -> list[str]:
         "separations continue by the law's limits.",
         f"Largest relative error of the table against the law: {about(law.error, 2)}. Simulations scatter about the "
         "law by percents to tens of percents, which the documentation lists.",
-        written_by(["c", "--variant", variant.name, "--out", "."]),
+        written_by(["c", *of_table, "--variant", variant.name, "--out", "."]),
         CONVENTIONS,
         *LICENCE,
     ]
@@ -397,7 +406,7 @@ def write_code(
     """
     rule = get_variant(variant)
     model = universal_model() if table is None else _table_of(table, rule)
-    texts = source_texts(model, rule) | {POINTS_FILE: points_text(model, rule)}
+    texts = source_texts(model, rule, table) | {POINTS_FILE: points_text(model, rule)}
     for name, text in texts.items():
         write_file(pathlib.Path(folder, name), text.encode(), make_folders=True)
     return [pathlib.Path(folder, name) for name in texts]
