@@ -299,6 +299,10 @@ WRONG = [
         "[axes.X]\nlow = 5.0\nhigh = 2.0",
         "axes.X: its nodes must increase from low to high",
     ),
+    (
+        "[axes.X]\nlow = 2.0\nhigh = 2.0",
+        "axes.X: its nodes must increase from low to high",
+    ),
     ("variant = [", "is not a TOML file"),
     (
         SMALL["universal"].replace("max_nodes = 5000", "max_nodes = 100"),

@@ -368,6 +368,7 @@ def test_one_point_a_call(tmp_path):
     ("entries", "message"),
     [
         ({"axes": {"x": {"low": 1.0, "high": 0.0}, "y": UNIT}}, "low must be below high"),
+        ({"axes": {"x": {"low": 1.0, "high": 1.0}, "y": UNIT}}, "low must be below high"),
         (
             {"axes": {"x": UNIT | {"transform": "log"}, "y": UNIT}},
             "above 0 on a logarithmic",

@@ -123,6 +123,8 @@ WRONG = [
     ("targte = 1e-3", "unknown key 'targte'; did you mean 'target'"),
     ("[axes.hurst]\nnodes = 1", "1 is less than the minimum of 8"),
     ("[axes.hurst]\nlow = 0.9\nhigh = 0.5", "axes.hurst: its nodes must increase"),
+    ("[axes.hurst]\nlow = 0.5\nhigh = 0.5", "axes.hurst: its nodes must increase"),
+    ("[axes.hurts]\nlow = 0.5", "unknown key 'hurts'; did you mean 'hurst'"),
     ("target = nan", "target must be a finite number, got nan"),
     ("target = ", "is not a TOML file"),
 ]
