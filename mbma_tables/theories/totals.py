@@ -45,7 +45,7 @@ def totals_of(theory: str | Theory | UserTheory, of_h_max: bool = True) -> Total
     >>> from mbma_tables.theories.totals import totals_of
     >>> found = totals_of("persson", of_h_max=False)(0.8, 100.0, 1.0)
     >>> round(float(found["area"]), 4)
-    0.0542
+    0.0492
     """
     chosen = resolve(theory)
 
