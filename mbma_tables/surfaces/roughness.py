@@ -191,6 +191,18 @@ def surface_of_roughness(
     return surface if "rolloff" not in stated else _rolled_off(surface, at["rolloff"])
 
 
+def record_of_labels(
+    names: list[str], unit: str | None, process: str | None
+) -> dict[str, Any]:
+    """The record of a surface of DataArrays, whose numbers may be lazy and are left out."""
+    return {
+        "step": "from_roughness",
+        "unit": unit,
+        "assumed": [ASSUMED, *(SAID[name] for name in names)],
+        **record_of_process(process),
+    }
+
+
 def _refuse_missing(
     stated: Mapping[str, Any], height: str, band: list[str], top: str
 ) -> None:

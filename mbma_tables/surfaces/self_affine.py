@@ -22,11 +22,11 @@ from mbma_tables.common.arguments import (
 )
 from mbma_tables.common.display import shown
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.units import Units
+from mbma_tables.common.units import Units, in_one_unit
 from mbma_tables.surfaces import spectrum
 from mbma_tables.surfaces.any_surface import AnySurface, apply, frozen, refuse_plain
 from mbma_tables.surfaces.heights import of_area
-from mbma_tables.surfaces.roughness import surface_of_roughness
+from mbma_tables.surfaces.roughness import record_of_labels, surface_of_roughness
 
 if TYPE_CHECKING:
     from mbma_tables.surfaces.psd import SpectrumFit
@@ -310,6 +310,8 @@ class SelfAffine(AnySurface):
             for name, value in locals().items()
             if name not in ("cls", "unit", "process")
         }
+        if any(map(is_labelled, roughness_parameters.values())):
+            return _of_labelled_roughness(cls, unit, roughness_parameters, process)
         numbers = surface_of_roughness(unit, roughness_parameters, process)
         if "bands" in numbers:
             return cls.banded(**numbers)
@@ -420,6 +422,32 @@ class SelfAffine(AnySurface):
         return np.where(
             inside, scale * (wavenumber / self.q0) ** (-2 - 2 * self.hurst), 0.0
         )[()]
+
+
+def _of_labelled_roughness(
+    kind: Any, unit: str | None, given: Mapping[str, Any], process: str | None
+) -> Any:
+    """The batch of DataArrays of roughness parameters, lazy where they are."""
+    stated = {name: value for name, value in given.items() if value is not None}
+    stated, unit = in_one_unit(stated, unit)
+    refuse_plain(stated)
+
+    def block(*numbers: Any) -> tuple[Any, ...]:
+        fields = [field.ravel() for field in np.broadcast_arrays(*numbers)]
+        made = kind.from_roughness(
+            **dict(zip(stated, fields, strict=True)), process=process, unit=unit
+        )
+        shape = np.broadcast_shapes(*map(np.shape, numbers))
+        return tuple(np.reshape(field, shape) for field in made.numbers().values())
+
+    has_bands = "rolloff" in stated
+    outputs = 1 + 2 * len(spectrum.Band._fields) if has_bands else len(PARAMETERS)
+    fields = apply(block, tuple(stated.values()), outputs)
+    records = (record_of_labels(list(stated), unit, process),)
+    if not has_bands:
+        return kind(*fields, unit=unit, provenance=records)
+    bands = fields[1:5], fields[5:]
+    return kind.banded(bands, fields[0], unit=unit, provenance=records)
 
 
 def _same_band(*numbers: Any) -> NDArray[np.bool_]:

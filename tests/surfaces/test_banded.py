@@ -198,3 +198,27 @@ def test_other_theories_of_batches_are_as_one_by_one():
         for name in ("area", "mean_separation", "stiffness"):
             found = getattr(many, name)[1]
             assert found == pytest.approx(getattr(wanted, name), rel=1e-5), name
+
+
+@pytest.mark.parametrize("lazy", [False, True])
+@pytest.mark.parametrize("rolloff", [{}, {"rolloff": 60.0}], ids=["power law", "rolloff"])
+def test_roughness_parameters_are_data_arrays(lazy, rolloff):
+    Ra = xr.DataArray([0.3, 0.4], dims="height")
+    slope = xr.DataArray([0.1, 0.15, 0.2], dims="slope")
+    if lazy:
+        pytest.importorskip("dask")
+        Ra, slope = Ra.chunk(1), slope.chunk(2)
+    rest = {"hurst": 0.8, "longest": 400.0, "nominal_area": 4e8, "unit": "um"} | rolloff
+    many = Surface.from_roughness(Ra=Ra, Rdq=slope, **rest)
+    plain = Surface.from_roughness(
+        Ra=np.array([[0.3], [0.4]]), Rdq=np.array([0.1, 0.15, 0.2]), **rest
+    )
+    for name in ("q1", "h_rms", "h_max", "m2"):
+        found = getattr(many, name)
+        assert found.dims == ("height", "slope")
+        assert (found.chunks is not None) == lazy
+        np.testing.assert_allclose(found.values, getattr(plain, name), rtol=1e-12)
+    area = contact(many, "100 GPa", pressure="5 MPa").area
+    wanted = contact(plain, "100 GPa", pressure="5 MPa").area
+    np.testing.assert_allclose(area.values, wanted, rtol=1e-12)
+    assert any("Ra" in line for line in many.provenance[0]["assumed"])
