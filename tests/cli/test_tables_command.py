@@ -167,7 +167,7 @@ def of_functions(tmp_path_factory):
     return paths
 
 
-def test_a_table_of_a_function_is_shown_and_sampled(of_functions):
+def test_a_table_of_a_function_is_shown_sampled_and_verified(of_functions):
     """The commands refused it as neither universal nor island4d."""
     path = str(of_functions["xy"])
     table = open_table(path)
@@ -175,6 +175,10 @@ def test_a_table_of_a_function_is_shown_and_sampled(of_functions):
     assert shown["axes"]["x"]["transform"] == "log"
     assert shown["attributes"] == table.attributes
     assert "\naxis y: " in run("tables", "show", path)
+    cells = len(table.arrays["starts"])
+    assert f"hashes match; {cells} cells; " in run("tables", "verify", path)
+    (verdict,) = json.loads(run("tables", "verify", path, "--json"))["tables"]
+    assert verdict == {"path": path, "kind": "function", "cells": cells}
     asked = ("tables", "sample", path, "--at", "x=1,1.5", "--at", "y=0.75", "--json")
     report = json.loads(run(*asked))
     found = table.lookup([1.0, 1.5], 0.75)
