@@ -104,7 +104,11 @@ def export_command(target: str, out: Path, asked: dict[str, Any], **values: Any)
     FMI 2 (fmu); c is the whole model as code, of the paper's variants reported and printed.
     A --table of four numbers is of one variant, and has mbma_lookup_of in place of mbma_phi_of.
 
+    In place of a surface --joint takes the file of a joint, and --law rows that are written.
+
     Example: mbma export calculix --surface concrete --E-star 13.3MPa --out law.inp
+
+    Example: mbma export abaqus --joint examples/joint.toml --pressures 1MPa:50MPa --out joint.inp
     """
     require_name("target", target, targets())
     kind = targets()[target]
