@@ -146,7 +146,9 @@ def test_scipy_minimises_with_the_gradient():
 
 def test_jax_has_values_gradients_and_batches():
     jax = pytest.importorskip("jax")
-    with jax.enable_x64(True):
+    before = jax.config.jax_enable_x64
+    jax.config.update("jax_enable_x64", True)
+    try:
         function = ground_function()
         x = np.array([[0.5, 0.1, 100.0, 0.01], [0.4, 0.12, 90.0, 0.02]])
         values, jacobian = function.values_and_jacobian(x)
@@ -163,6 +165,8 @@ def test_jax_has_values_gradients_and_batches():
         # of sums over a batch
         summed = jax.grad(lambda x: one(x).sum())(x)
         np.testing.assert_allclose(summed, jacobian[:, 0], rtol=1e-12)
+    finally:
+        jax.config.update("jax_enable_x64", before)
 
 
 def test_torch_has_values_and_gradients():
