@@ -38,7 +38,10 @@ NEAREST = 1e-9
 # powers of two below which gaps are in one record, at the most and at the least
 OCTAVES = range(6, 21)
 ROUNDINGS = 8 * sys.float_info.epsilon
-CHECKED = 501
+CHECKED = 2001
+CHECKED_EACH = 17
+# of the largest error of a gas there: with kinks of a theory it may be as large again between
+BETWEEN = 2.0
 LARGEST_ERROR = 0.05  # of a function that is written
 MOST_PIECES = 250  # of polynomials, where a coarser tolerance needs fewer
 # overclosures at which a quantity is looked at before it is fitted, over the largest
@@ -114,20 +117,30 @@ def curve_of_gas(exported: ExportedLaw, gas: GasInGaps) -> Curve:
     jump_length = float(jump) * metre
     # of the sum that the polynomials have there
     at_top = float(offset + conductance(np.array([top]))[0]) - offset
-    d = np.linspace(bottom, min(h_max, top), CHECKED)
-    written = np.empty(CHECKED)
+    d = _checked(block, bottom, top, min(h_max, top))
+    d = d[d <= min(h_max, top)]
+    written = np.empty(d.size)
     core.law_fill(d, block, written, *[None] * 4)
     exact = conductance(d)
     # relative to first contact next to full contact
     error = np.abs(written - offset - exact) / np.maximum(exact, offset)
     return Curve(
         block,
-        float(error.max()),
+        BETWEEN * float(error.max()),
         begin=_overclosure_at(top, h_max) if exported.ends else -math.inf,
         offset=offset,
         far=at_top * ((h_max + top) / 2 + jump_length),
         jump=jump_length,
     )
+
+
+def _checked(block: FloatArray, bottom: float, top: float, end: float) -> FloatArray:
+    """Gaps at which polynomials are compared with what they stand for: in each record, and evenly."""
+    records = block[int(block.view(np.int64)[at.RECORDS]) :].reshape(-1, at.RECORD)
+    share = np.cos(np.pi * np.arange(CHECKED_EACH) / (CHECKED_EACH - 1))
+    x = records[:, at.CENTRE, None] + share / records[:, at.RATE, None]
+    of_records = bottom + (top - bottom) * np.clip(x, 0.0, 1.0).ravel()
+    return np.append(of_records, np.linspace(bottom, end, CHECKED))
 
 
 def _overclosure_at(gap: float, h_max: float) -> float:

@@ -133,7 +133,7 @@ def brackets(values: FloatArray) -> str:
     """A column, or rows of polynomials, as Python has them."""
     if values.ndim == 1:
         return f"[{wrapped(', '.join(map(number, values)))}]"
-    return f"[\n{_lines(_decimals(values), '[', '],')}\n]"
+    return f"[\n{_lines(decimals(values), '[', '],')}\n]"
 
 
 def braces(values: FloatArray) -> str:
@@ -143,7 +143,7 @@ def braces(values: FloatArray) -> str:
 
 def matrix(values: FloatArray) -> str:
     """A column, or rows of polynomials, of MATLAB."""
-    rows = values[:, None] if values.ndim == 1 else _decimals(values)
+    rows = values[:, None] if values.ndim == 1 else decimals(values)
     return f"[\n{_lines(rows, '', ';')}]"
 
 
@@ -172,7 +172,7 @@ def _decimal_places(row: FloatArray) -> int:
     return min(-math.floor(log_step), MOST_DECIMALS)
 
 
-def _decimals(rows: FloatArray) -> FloatArray:
+def decimals(rows: FloatArray) -> FloatArray:
     """Coefficients in decimal steps."""
     written = []
     for row in rows:
