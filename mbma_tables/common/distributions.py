@@ -215,7 +215,8 @@ def distributions_in(
     elif isinstance(entries, Mapping):
         for key, entry in entries.items():
             yield from distributions_in(entry, f"{place}.{key}".lstrip("."), str(key))
-    elif isinstance(entries, tuple | list):
+    elif isinstance(entries, tuple | list) and len(entries) <= 2:
+        # one of each body; longer ones are batches
         for index, entry in enumerate(entries):
             yield from distributions_in(entry, f"{place}.{index}", name)
 

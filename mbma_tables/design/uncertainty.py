@@ -407,14 +407,20 @@ def uncertainty_of(
     error = _standard_normal(uniform[:, -1])
     columns = {name: rows[-draws:] for name, rows in drawn.items()} | {MODEL: error}
     bands = {}
-    shares = {}
+    logarithms = []
     for name, rows in evaluated.values.items():
         scatter = evaluated.scatter[name][-draws:]
         table = _with_model(rows[-draws:], scatter, error)
         bands[name] = np.quantile(table, levels, axis=0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            logarithms = np.where((table > 0).all(axis=0), np.log(table), table)
-        shares[name] = _shares(columns, logarithms)
+            logarithms.append(np.where((table > 0).all(axis=0), np.log(table), table))
+    # one fit for all quantities
+    fitted = _shares(columns, np.concatenate(logarithms, axis=1))
+    shares = {}
+    for k, name in enumerate(bands):
+        own = slice(k * len(pressures), (k + 1) * len(pressures))
+        shares[name] = {of: share[own] for of, share in fitted.items()}
+        scatter = evaluated.scatter[name][-draws:]
         is_stated = np.isfinite(scatter).all(axis=0)
         shares[name][MODEL] = np.where(is_stated, shares[name][MODEL], np.nan)
     central = evaluated.central
