@@ -9,7 +9,6 @@ depends on nothing else, so that pieces can be made anywhere, ended and continue
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 from typing import Any
 
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
+from mbma_tables.common.shared import shared
 
 PENDING, POLYNOMIAL, NO_ANSWER = -3, -1, -2  # of boxes that are not halved; as in mbma.h
 # by the number of axes: terms at first and at most along an axis, test points of a box, and
@@ -61,13 +61,13 @@ class Aim:
             return np.where(plain.reshape(shape), size, 1.0)
 
 
-@functools.cache
+@shared(64)
 def nodes(terms: int) -> FloatArray:
     """Chebyshev nodes in [-1, 1]."""
     return np.asarray(-np.cos(np.pi * (np.arange(terms) + 0.5) / terms))
 
 
-@functools.cache
+@shared(64)
 def fit(terms: int) -> FloatArray:
     """The matrix from values at the nodes to coefficients."""
     angles = np.pi * (np.arange(terms)[:, None]) * (np.arange(terms)[::-1] + 0.5) / terms
@@ -76,7 +76,7 @@ def fit(terms: int) -> FloatArray:
     return np.asarray(matrix)
 
 
-@functools.cache
+@shared(64)
 def tests(axes: int) -> FloatArray:
     """Test points of a box in [-1, 1], denser at its faces, shape (points, axes)."""
     from scipy.stats import qmc

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import json
 import os
 from collections.abc import Mapping
@@ -24,6 +23,7 @@ from mbma_tables.common.display import Variable, dataset_of
 from mbma_tables.common.errors import ConvergenceError, InputError, TableFileError
 from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.netcdf import read_own
+from mbma_tables.common.shared import frozen, shared_property
 from mbma_tables.core import core
 from mbma_tables.tables.boxes import NO_ANSWER, POLYNOMIAL, tests
 
@@ -129,7 +129,7 @@ class FunctionTable:
     ) -> None:
         self.axes, self.outputs = axes, outputs
         self.attributes = dict(attributes)
-        self.arrays = {name: np.asarray(array) for name, array in arrays.items()}
+        self.arrays = frozen({name: np.array(array) for name, array in arrays.items()})
 
     def __reduce__(self) -> Any:
         return type(self), (self.axes, self.outputs, self.arrays, self.attributes)
@@ -144,7 +144,7 @@ class FunctionTable:
             f"largest held-out error {errors})"
         )
 
-    @functools.cached_property
+    @shared_property
     def core_arrays(self) -> dict[str, Any]:
         """The arrays as the core has them: terms of the last axis followed by zeros to a multiple of LANES."""
         terms = self.arrays["terms"].astype(int)
@@ -160,7 +160,7 @@ class FunctionTable:
         coefficients[np.repeat(first, used) + within] = self.arrays["coefficients"]
         return self.arrays | {"starts": starts[:-1], "coefficients": coefficients}
 
-    @functools.cached_property
+    @shared_property
     def _core(self) -> tuple[Any, ...]:
         """The table as arguments of the core."""
         rows = [
@@ -181,13 +181,13 @@ class FunctionTable:
         exponential = np.array(logs, dtype=np.int32)
         return np.array(rows).ravel(), exponential, *(arrays[name] for name in names)
 
-    @functools.cached_property
+    @shared_property
     def _widths(self) -> FloatArray:
         """Widths of the cells in coordinates, shape (cells, axes)."""
         _, low, high = self._ends
         return high - low
 
-    @functools.cached_property
+    @shared_property
     def _ends(self) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
         """Numbers of the boxes of cells, and their ends in coordinates, shape (cells, axes)."""
         branches = self.arrays["branches"].astype(int)
@@ -388,7 +388,7 @@ class FunctionTable:
         found[cells < 0] = np.nan
         return np.asarray(found)
 
-    @functools.cached_property
+    @shared_property
     def _directions(self) -> tuple[NDArray[np.int64], FloatArray]:
         """By output and axis 1, -1, or 0 where slopes of both signs occur, and a place of the other sign."""
         _, low, high = self._ends

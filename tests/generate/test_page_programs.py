@@ -92,7 +92,7 @@ def test_figures_are_small_drawings_each_shown_by_a_page():
         name
         for page in pages
         for name in re.findall(
-            r"\]\((?:docs/)?figures/([^)]+)\)", page.read_text("utf-8")
+            r"\]\((?:docs/|\.\./)?figures/([^)]+)\)", page.read_text("utf-8")
         )
     }
     assert shown == {path.name for path in (ROOT / "docs" / "figures").iterdir()}

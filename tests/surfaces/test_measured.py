@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import mutually_broadcastable_shapes
 
 from generate.machined.makers import rough
-from mbma_tables import Bodies, InputError, OutOfRangeError, Surface, contact, contact_law
+from mbma_tables import Bodies, InputError, Surface, contact, contact_law
 from mbma_tables.contacts.quantities.leakage import shipped_flow
 from mbma_tables.export.rows.law_rows import describe_law
 from mbma_tables.surfaces.averages import average
@@ -299,17 +299,17 @@ class TestCombined:
         with pytest.raises(InputError, match="beside DataArrays"):
             one.combined(dataclasses.replace(FIVE, h_rms=np.array([1.0, 2.0])))
         narrow = dataclasses.replace(other, q1=1.0)
-        with pytest.raises(OutOfRangeError, match="one surface at a time"):
-            one.combined(narrow).h_rms.compute()
+        np.testing.assert_allclose(one.combined(narrow).h_rms.compute(), expected)
 
-    def test_a_batch_is_refused(self):
-        with pytest.raises(InputError, match="one surface at a time"):
-            Surface(hurst=[0.5, 0.8], q0=0.01, q1=2.0, h_rms=1.5, h_max=4.0).combined(
-                FIVE
-            )
-        with pytest.raises(OutOfRangeError, match=r"at \(0,\)") as refused:
-            Surface([0.5, 0.8], 0.01, 2.0, 1.5, 4.0).combined(FIVE)
-        assert refused.value.mask.tolist() == [True, False]
+    def test_a_batch_of_other_bands_is_that_of_each(self):
+        both = Surface([0.5, 0.8], 0.01, 2.0, 1.5, 4.0).combined(FIVE)
+        for number, hurst in enumerate((0.5, 0.8)):
+            one = Surface(hurst, 0.01, 2.0, 1.5, 4.0).combined(FIVE)
+            # that of one joint is of a sampled spectrum
+            assert both.h_rms[number] == pytest.approx(one.h_rms, rel=1e-5)
+            assert both.rms_gradient[number] == pytest.approx(one.rms_gradient, rel=1e-4)
+
+    def test_batches_that_do_not_broadcast_are_refused(self):
         with pytest.raises(InputError, match="do not broadcast"):
             Surface(0.8, 0.01, 2.0, [1.5, 1.6], 4.0).combined(
                 Surface(0.8, 0.01, 2.0, [1.5, 1.6, 1.7], 4.0)

@@ -157,7 +157,7 @@ def test_exports_have_the_leakage_along_an_axis(file, own, tmp_path):
     assert "must be 'x', 'y' or degrees" in refused(
         "export", "csv", *words, "z", "--out", tmp_path / "no.csv"
     )
-    assert "add --leakage" in refused(
+    assert "ask for leakage" in refused(
         "export", "csv", *words[:4], "--direction", "x", "--out", tmp_path / "no.csv"
     )
 
