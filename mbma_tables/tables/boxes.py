@@ -36,6 +36,7 @@ BOUND = 2.0  # bound over the largest error at the tests of a box
 TRIMMED = 0.05  # of the target, what terms that are left out may add up to
 SLOWEST = 0.98  # ratio of one term to the one before, for estimates of what is left out
 MOST_ROUNDS = 8  # of held-out points
+REPLAYED = 16  # held-out points of a piece that a file keeps
 ROUNDING = 1e-15
 
 
@@ -195,6 +196,8 @@ class Piece:
         self.round = 0  # of held-out points; 0 while boxes are pending
         self.errors: FloatArray | None = None  # at held-out points, once it is done
         self.excess = 0  # held-out points, of all rounds, above the bound of their box
+        # the first held-out points with a value, and what is stored there, to replay
+        self.replayed = np.empty((0, low.size)), np.empty((0, len(aim.target)))
 
     @property
     def axes(self) -> int:
@@ -381,6 +384,8 @@ class Piece:
         self.round += 1
         if not again:
             self.errors = errors.T
+            some = np.flatnonzero(np.isfinite(errors).all(axis=0))[:REPLAYED]
+            self.replayed = points[some], stored.T[some]
         elif self.round >= MOST_ROUNDS:
             raise UnreachedError(
                 f"after {MOST_ROUNDS} rounds of {self.held_out} held-out points the target "
@@ -406,6 +411,8 @@ class Piece:
             ),
             "error": np.array([b.error for b in answered]),
             "round": np.array([self.round, self.excess]),
+            "replayed_points": self.replayed[0],
+            "replayed_values": self.replayed[1],
         }
         return found | ({} if self.errors is None else {"errors": self.errors})
 
@@ -428,6 +435,7 @@ class Piece:
                 start, number = end, number + 1
         self.round, self.excess = map(int, state["round"])
         self.errors = state.get("errors")
+        self.replayed = state["replayed_points"], state["replayed_values"]
 
 
 class UnsmoothError(UnreachedError):

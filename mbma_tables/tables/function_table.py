@@ -509,6 +509,13 @@ class FunctionTable:
             error = bound / slope + ROUNDING * np.abs(x[:, a])
         return x[:, a].copy(), error
 
+    def replayed(self) -> tuple[int, float]:
+        """Held-out points that the file keeps, and the largest error there over the bound."""
+        x, exact = self.arrays["conformance_x"], self.arrays["conformance_exact"]
+        values, _, errors, _ = self._answers(np.ascontiguousarray(x), False)
+        bounds = self._absolute(values, errors)
+        return len(x), float(np.max(np.abs(values - exact) / bounds, initial=0.0))
+
     def to_dataset(self, **axes: ArrayLike) -> xr.Dataset:
         """Every output and the bound on its error on a grid, as an xarray Dataset.
 
@@ -550,6 +557,11 @@ def read_function_table(path: os.PathLike[str] | str) -> FunctionTable:
     try:
         axes = tuple(FunctionAxis(**entry) for entry in json.loads(attributes["axes"]))
         outputs = tuple(Output(**entry) for entry in json.loads(attributes["outputs"]))
+        points = values["conformance_x"], values["conformance_exact"]
+        if [array.shape for array in points] != [
+            (len(points[0]), len(of)) for of in (axes, outputs)
+        ]:
+            raise ValueError("has incomplete conformance points")
         return checked(FunctionTable(axes, outputs, values, attributes))
     except (KeyError, TypeError, ValueError) as fault:
         raise TableFileError(f"{path}: {fault}; {REMEDY}") from None

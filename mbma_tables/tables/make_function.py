@@ -63,7 +63,6 @@ DEFAULTS: dict[str, Any] = {
     "licence": "",
     "source": "",
 }
-CONFORMANCE_POINTS = 64
 SAVED_EVERY = 5.0  # s, between two states of a piece that is not finished
 JOBS_AHEAD = 4  # jobs a worker between two looks at the clock
 
@@ -515,6 +514,13 @@ def table_of(wanted: Wanted, pieces: list[Piece]) -> FunctionTable:
         "coefficients": np.concatenate([np.ravel(box.coefficients) for box in cells]),
         "errors": np.array([box.error for box in cells]),
     }
+    replayed = zip(*(piece.replayed for piece in pieces), strict=True)
+    points, values = (np.concatenate(part) for part in replayed)
+    logs = np.array([output.transform == "log" for output in wanted.outputs])
+    arrays["conformance_x"] = _in_x(wanted, points)
+    arrays["conformance_exact"] = np.where(
+        logs, np.exp(np.where(logs, values, 0.0)), values
+    )
     errors = np.concatenate(
         [piece.errors for piece in pieces if piece.errors is not None]
     )
@@ -627,6 +633,8 @@ def write(path: pathlib.Path, table: FunctionTable) -> None:
         "terms": (("cell", "axis"), "terms of each cell along each axis"),
         "coefficients": (("coefficient",), "Chebyshev coefficients"),
         "errors": (("cell", "output"), "bound on the error in each cell"),
+        "conformance_x": (("conformance", "axis"), "held-out points to replay"),
+        "conformance_exact": (("conformance", "output"), "what the function gives there"),
     }
     variables = {
         name: (dims, table.arrays[name], meaning, "1")

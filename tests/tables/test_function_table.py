@@ -471,3 +471,26 @@ def test_polynomials_are_tabulated_exactly(factors, width, seed):
 def test_the_forecast_calls_the_function_a_few_times():
     text = make_function.forecast(wanted_of(SMOOTH))
     assert "points in 16 pieces" in text
+
+
+def test_points_of_a_file_are_replayed(tmp_path):
+    entries = SMOOTH | {
+        "outputs": {"u": {"transform": "log"}, "v": {"error": "absolute"}}
+    }
+    table = made(tmp_path, "smooth", entries, 1e-4)
+    count, excess = table.replayed()
+    assert count == 16 * 16
+    assert 0 < excess <= 1
+    x, y = table.arrays["conformance_x"].T
+    exact = np.stack(tabulated.smooth(x, y), axis=-1)
+    np.testing.assert_allclose(table.arrays["conformance_exact"], exact, rtol=1e-12)
+    found = CliRunner().invoke(main, ["tables", "verify", str(tmp_path / "t.nc")])
+    assert "256 conformance points" in found.output
+    # coefficients that are off, in a file whose hashes fit
+    other = {**table.arrays, "coefficients": table.arrays["coefficients"] * 1.01}
+    kept = {n: v for n, v in table.attributes.items() if not n.endswith("_sha256")}
+    off = type(table)(table.axes, table.outputs, other, kept)
+    make_function.write(tmp_path / "off.nc", off)
+    found = CliRunner().invoke(main, ["tables", "verify", str(tmp_path / "off.nc")])
+    assert found.exit_code != 0
+    assert "times its bound" in found.output
