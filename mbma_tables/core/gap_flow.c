@@ -40,8 +40,8 @@ static bool fill_bands(const sum_of_parts *s, bands *b) {
     double totals[2] = {0.0, 0.0}, left;
     size_t count = 0;
     for (size_t k = 0; k < BANDS; k++) {
-        const double low = last * 0.5 * (1.0 - cos(MBMA_PI * (double)k / BANDS));
-        const double high = last * 0.5 * (1.0 - cos(MBMA_PI * (double)(k + 1) / BANDS));
+        const double low = last * 0.5 * (1.0 - cos(MBMA_PI * (double)k / (double)BANDS));
+        const double high = last * 0.5 * (1.0 - cos(MBMA_PI * (double)(k + 1) / (double)BANDS));
         const double variance = moment_between(s, 0, low, high);
         if (!(variance > 0.0))
             continue;
