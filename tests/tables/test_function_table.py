@@ -78,12 +78,14 @@ def test_targets_hold_on_points_that_nothing_saw(function, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("function", FUNCTIONS)
-def test_targets_hold_on_a_million_points(function, tmp_path):
+def test_targets_hold_on_many_points(function, tmp_path):
     entries, target = FUNCTIONS[function]
     table = made(tmp_path, function, entries, target)
-    worst, above = errors_of(table, 1_000_000, seed=12)
+    # a lookup of six axes takes 10 us; `python -m benchmarks functions` has a million of it
+    points = 1_000_000 if len(table.axes) < 6 else 100_000
+    worst, above = errors_of(table, points, seed=12)
     assert (worst <= target).all()
-    assert above <= 10  # of a million, and none above the target
+    assert above <= 10  # and none above the target
 
 
 @pytest.mark.slow
