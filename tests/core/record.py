@@ -122,7 +122,7 @@ def use():
     X = np.linspace(-5, 40, 300)
     mu = np.geomspace(1e-6, 1e5, 300)
     universal.answer(X, mu)
-    four = np.linspace(1.0, 3.0, 300), 3.0, np.linspace(3.1, 400.0, 300), 0.8
+    four = np.linspace(1.0, 3.0, 40), 3.0, np.linspace(3.1, 400.0, 40), 0.8
     open_table("island4d").lookup(*four)
     band_fields(np.geomspace(1e-9, 1e3, 300), np.linspace(0, 1, 300), 0.7, REPORTED)
     of_functions = table_of_a_function()
@@ -133,9 +133,10 @@ def use():
     one = Surface(0.7, 0.2, 60.0, 1.0, 3.0)
     many = Surface(np.linspace(0.3, 1.0, 40), 0.2, np.geomspace(0.7, 4000, 40), 1.0, 3.0)
     assert contact(one, separation=[0.5, 1.0]).stiffness.all()
-    for model, outside in (("universal", "raise"), ("island4d", "nan")):
-        theory = Mbma(model, rtol=1e-6, outside=outside)
-        contact(many, separation=np.linspace(-2, 2.9, 40), theory=theory)
+    contact(many, separation=np.linspace(-2, 2.9, 40), theory=Mbma(rtol=1e-6))
+    # as few islands as a batch has: each of its numbers is spoilt in many ways under sanitizers
+    few = Surface(np.linspace(0.5, 0.9, 17), 0.2, 60.0, 1.0, 3.0)
+    contact(few, separation=2.0, theory=Mbma("island4d", rtol=1e-2, outside="nan"))
     law = contact_law(one, theory="mbma")
     gaps = np.linspace(-2.9, 2.9, 100)
     for quantity in (law.pressure, law.area, law.stiffness, law.area_slope, law.energy):
