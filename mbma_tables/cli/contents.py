@@ -19,11 +19,10 @@ from mbma_tables.cli.options import (
 from mbma_tables.cli.tables import place_of, print_facts
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file, written_bytes
-from mbma_tables.common.netcdf import holds_own, kind_of, opened, read_own
+from mbma_tables.common.netcdf import holds_own, opened, read_own
 from mbma_tables.islands.island_models import OUTSIDE
-from mbma_tables.tables.function_table import KIND as FUNCTION
-from mbma_tables.tables.function_table import FunctionTable, read_function_table
-from mbma_tables.tables.reader import REMEDY, read_table
+from mbma_tables.tables.function_table import FunctionTable
+from mbma_tables.tables.reader import REMEDY, read_any
 from mbma_tables.tables.schema import UNIVERSAL, TableContent
 
 # beginnings of the names of attributes, by what they are about; others describe the table
@@ -44,10 +43,7 @@ DESCRIPTION = "description"
 
 def _read(table: str) -> TableContent | FunctionTable:
     """The contents of a table of islands or of a function, by its kind or file."""
-    path, kind = place_of(table)
-    if kind is None and kind_of(path, REMEDY.format("KIND")) == FUNCTION:
-        return read_function_table(path)
-    return read_table(path, kind)
+    return read_any(*place_of(table))
 
 
 def _variables(path: Path) -> dict[str, dict[str, Any]]:

@@ -14,12 +14,12 @@ from mbma_tables.common import cache
 from mbma_tables.common.arguments import nearest
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import write_file
-from mbma_tables.common.netcdf import OWN, OWN_REMEDY, holds_own, kind_of
+from mbma_tables.common.netcdf import OWN, OWN_REMEDY, holds_own
 from mbma_tables.common.progress import echo
 from mbma_tables.tables.function_table import KIND as FUNCTION
 from mbma_tables.tables.function_table import REMEDY as OF_FUNCTIONS
-from mbma_tables.tables.function_table import read_function_table
-from mbma_tables.tables.reader import REMEDY
+from mbma_tables.tables.function_table import FunctionTable
+from mbma_tables.tables.reader import read_any
 from mbma_tables.tables.schema import KINDS
 
 FAITHFUL = 1e-6  # relative, of an own table's curves at the loads they go through
@@ -74,8 +74,8 @@ def _verified(table: str) -> tuple[dict[str, Any], str]:
             f"{table}: hashes match; {loads} simulated loads: curves within {error:.1e}",
         )
     path, kind = place_of(table)
-    if kind is None and kind_of(path, REMEDY.format("KIND")) == FUNCTION:
-        points, excess = read_function_table(path).replayed()
+    if kind is None and isinstance(contents := read_any(path), FunctionTable):
+        points, excess = contents.replayed()
         if not excess <= 1:
             raise TableFileError(
                 f"{table}: at a conformance point its error is {excess:.3g} times its bound; {OF_FUNCTIONS}"

@@ -12,9 +12,13 @@ import tempfile
 import time
 import uuid
 from collections.abc import Callable, Iterator
+from typing import Any, TypeVar
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError, MbmaError
+from mbma_tables.common.shared import shared
+
+Content = TypeVar("Content")
 
 MAX_BYTES = 1 << 30  # of an input file
 ABANDONED = 3600.0  # s, age from which on a draft is no longer being written
@@ -25,6 +29,29 @@ def shipped_file(name: str) -> pathlib.Path:
     package = pathlib.Path(__file__).parents[1]
     inside = package / "tables" / "data" / name
     return inside if inside.exists() else package.parent / "tables" / name
+
+
+@shared(16)
+def _read_in_state(
+    path: pathlib.Path, state: tuple[int, int], read: Callable[[pathlib.Path], Any]
+) -> Any:
+    """What a reader makes of a file in a state, by its time and size."""
+    return read(path)
+
+
+def read_once(
+    path: os.PathLike[str] | str, read: Callable[[pathlib.Path], Content]
+) -> Content:
+    """What a reader makes of a file as it is now, read once, so that what holds it is equal."""
+    file = pathlib.Path(path)
+    try:
+        stat = file.stat()
+    except OSError:
+        # the reader's error
+        return read(file)
+    state = stat.st_mtime_ns, stat.st_size
+    content: Content = _read_in_state(file.resolve(), state, read)
+    return content
 
 
 def numbers_of(lines: list[str], delimiter: str | None) -> FloatArray:

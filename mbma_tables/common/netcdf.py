@@ -271,31 +271,25 @@ def write_own(
         raise TableFileError(f"cannot write {path}: {fault}") from None
 
 
-def read_own(
-    path: os.PathLike[str] | str,
-    kind: str = OWN,
-    version: str = OWN_FORMAT,
-    remedy: str = OWN_REMEDY,
+def own_content(
+    dataset: netCDF4.Dataset, kind: str, version: str
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Values and attributes of such a file; TableFileError where damaged or edited."""
-    with opened(path, remedy) as dataset:
-        attributes_of_file, _, values = verified(
-            dataset, ("mbma_kind", "format_version", "values_sha256")
+    """Values and attributes of an open file of `write_own`, which must be of a kind; else ValueError."""
+    attributes_of_file, _, values = verified(
+        dataset, ("mbma_kind", "format_version", "values_sha256")
+    )
+    of_file = tuple(attributes_of_file[name] for name in ("mbma_kind", "format_version"))
+    if of_file != (kind, version):
+        raise ValueError(
+            f"holds a {of_file[0]} of format {of_file[1]}, not a {kind} of {version}"
         )
-        of_file = tuple(
-            attributes_of_file[name] for name in ("mbma_kind", "format_version")
-        )
-        if of_file != (kind, version):
-            raise ValueError(
-                f"holds a {of_file[0]} of format {of_file[1]}, not a {kind} of {version}"
-            )
-        lost = [name for name, array in values.items() if not np.isfinite(array).all()]
-        if lost:
-            raise ValueError(f"has variable {lost[0]}, which is not finite")
+    lost = [name for name, array in values.items() if not np.isfinite(array).all()]
+    if lost:
+        raise ValueError(f"has variable {lost[0]}, which is not finite")
     return values, attributes_of_file
 
 
-def kind_of(path: os.PathLike[str] | str, remedy: str = REMEDY) -> str:
-    """The kind of a table's file, whose checksum is verified."""
-    with opened(path, remedy) as dataset:
-        return str(getattr(dataset, "mbma_kind", ""))
+def read_own(path: os.PathLike[str] | str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Values and attributes of a table of a user's own surface; TableFileError where damaged or edited."""
+    with opened(path, OWN_REMEDY) as dataset:
+        return own_content(dataset, OWN, OWN_FORMAT)

@@ -33,6 +33,7 @@ MOST_HALVINGS = (
 MOST_TRIALS = 3  # of terms in one box
 AIM = 0.4  # of the target, for the tests of a box
 BOUND = 2.0  # bound over the largest error at the tests of a box
+LEAST_BOUND = 0.05  # of the target
 TRIMMED = 0.05  # of the target, what terms that are left out may add up to
 SLOWEST = 0.98  # ratio of one term to the one before, for estimates of what is left out
 MOST_ROUNDS = 8  # of held-out points
@@ -153,9 +154,25 @@ class Box:
         middle, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
         return np.asarray(np.clip(middle + half * places, self.low, self.high))
 
+    def halves(self, axis: int, terms: tuple[int, ...]) -> list[Box]:
+        """Its lower and its upper half along an axis, with terms to begin with."""
+        halvings = self.halvings.copy()
+        halvings[axis] += 1
+        lower_end, upper_start = self.high.copy(), self.low.copy()
+        lower_end[axis] = upper_start[axis] = 0.5 * (self.low[axis] + self.high[axis])
+        return [
+            Box(self.low, lower_end, halvings, terms),
+            Box(upper_start, self.high, halvings.copy(), terms),
+        ]
+
     def place(self, points: FloatArray) -> FloatArray:
         """Inverse of `at`."""
         return np.asarray((2 * points - self.low - self.high) / (self.high - self.low))
+
+
+def middle_of(boxes: list[Box], box: Box) -> float:
+    """Where a box of a tree is halved; 0 for one that is not."""
+    return float(boxes[box.child].high[box.axis]) if box.axis >= 0 else 0.0
 
 
 class Piece:
@@ -163,10 +180,8 @@ class Piece:
 
     Parameters
     ----------
-    low, high : ndarray
-        Its ends on each axis.
-    halvings : ndarray of int
-        How often each axis of the whole range was halved for it.
+    whole : Box
+        The part.
     aim : Aim
     held_out : int
         Points on which it is checked, new ones in each round.
@@ -180,9 +195,7 @@ class Piece:
 
     def __init__(
         self,
-        low: FloatArray,
-        high: FloatArray,
-        halvings: NDArray[np.int64],
+        whole: Box,
         aim: Aim,
         held_out: int,
         seed: int,
@@ -191,13 +204,14 @@ class Piece:
     ) -> None:
         self.aim, self.held_out, self.seed, self.marks = aim, held_out, seed, marks
         self.most = most
-        first = (FIRST_TERMS[low.size],) * low.size
-        self.boxes = [Box(low, high, halvings, first)]
+        axes = whole.low.size
+        first = (FIRST_TERMS[axes],) * axes
+        self.boxes = [dataclasses.replace(whole, terms=first)]
         self.round = 0  # of held-out points; 0 while boxes are pending
         self.errors: FloatArray | None = None  # at held-out points, once it is done
         self.excess = 0  # held-out points, of all rounds, above the bound of their box
         # the first held-out points with a value, and what is stored there, to replay
-        self.replayed = np.empty((0, low.size)), np.empty((0, len(aim.target)))
+        self.replayed = np.empty((0, axes)), np.empty((0, len(aim.target)))
 
     @property
     def axes(self) -> int:
@@ -308,7 +322,7 @@ class Piece:
         rounding = ROUNDING * np.abs(series).reshape(len(series), -1).sum(axis=1)
         box.terms = series.shape[1:]
         box.coefficients = np.ascontiguousarray(series)
-        box.error = BOUND * worst + 0.05 * self.aim.target + rounding / scale
+        box.error = BOUND * worst + LEAST_BOUND * self.aim.target + rounding / scale
         box.axis = POLYNOMIAL
 
     def _decide_without_values(self, box: Box, values: FloatArray) -> None:
@@ -322,38 +336,26 @@ class Piece:
 
     def _halve(self, box: Box, axis: int, terms: tuple[int, ...]) -> None:
         """Replace a box by its halves along an axis."""
-        halvings = box.halvings.copy()
-        halvings[axis] += 1
-        if halvings[axis] > MOST_HALVINGS:
-            if self.marks:
-                box.axis = NO_ANSWER
-                return
-            raise UnsmoothError(box.at(np.zeros(self.axes)))
-        middle = 0.5 * (box.low[axis] + box.high[axis])
-        ends = box.high.copy(), box.low.copy()
-        ends[0][axis] = ends[1][axis] = middle
-        box.axis, box.child = axis, len(self.boxes)
         box.coefficients = box.error = None
-        self.boxes += [
-            Box(box.low, ends[0], halvings, terms),
-            Box(ends[1], box.high, halvings.copy(), terms),
-        ]
+        if box.halvings[axis] >= MOST_HALVINGS:
+            if not self.marks:
+                raise UnsmoothError(box.at(np.zeros(self.axes)))
+            box.axis = NO_ANSWER
+            return
+        box.axis, box.child = axis, len(self.boxes)
+        self.boxes += box.halves(axis, terms)
 
     def cells_at(self, points: FloatArray) -> NDArray[np.int64]:
-        """Numbers of the boxes of points."""
+        """Numbers of the boxes of points that are not halved."""
+        axis = np.array([box.axis for box in self.boxes])
+        child = np.array([box.child for box in self.boxes])
+        middles = np.array([middle_of(self.boxes, box) for box in self.boxes])
         found = np.zeros(len(points), dtype=np.int64)
         going = np.arange(len(points))
         while going.size:
-            boxes = [self.boxes[k] for k in found[going]]
-            axis = np.array([box.axis for box in boxes])
-            split = axis >= 0
-            going = going[split]
-            if not going.size:
-                break
-            chosen = [box for box, is_split in zip(boxes, split, strict=True) if is_split]
-            child = np.array([box.child for box in chosen])
-            middles = np.array([self.boxes[b.child].high[b.axis] for b in chosen])
-            found[going] = child + (points[going, axis[split]] >= middles)
+            going = going[axis[found[going]] >= 0]
+            box = found[going]
+            found[going] = child[box] + (points[going, axis[box]] >= middles[box])
         return found
 
     def _check(self, points: FloatArray, stored: FloatArray) -> None:
@@ -395,9 +397,7 @@ class Piece:
     def state(self) -> dict[str, Any]:
         """All that it has found so far, as arrays."""
         boxes = self.boxes
-        answered = [
-            b for b in boxes if b.coefficients is not None and b.error is not None
-        ]
+        answered = [box for box in boxes if box.axis == POLYNOMIAL]
         found: dict[str, Any] = {
             "low": np.array([box.low for box in boxes]),
             "high": np.array([box.high for box in boxes]),

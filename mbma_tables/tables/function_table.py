@@ -20,14 +20,15 @@ from mbma_tables.common.arguments import (
     require,
 )
 from mbma_tables.common.display import Variable, dataset_of
-from mbma_tables.common.errors import ConvergenceError, InputError, TableFileError
+from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.common.interrupts import in_blocks
-from mbma_tables.common.netcdf import read_own
+from mbma_tables.common.netcdf import opened, own_content
 from mbma_tables.common.shared import frozen, shared_property
 from mbma_tables.core import core
 from mbma_tables.tables.boxes import NO_ANSWER, POLYNOMIAL, tests
 
 if TYPE_CHECKING:
+    import netCDF4
     import xarray as xr
 
 KIND = "function"
@@ -184,12 +185,12 @@ class FunctionTable:
     @shared_property
     def _widths(self) -> FloatArray:
         """Widths of the cells in coordinates, shape (cells, axes)."""
-        _, low, high = self._ends
+        low, high = self._ends
         return high - low
 
     @shared_property
-    def _ends(self) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-        """Numbers of the boxes of cells, and their ends in coordinates, shape (cells, axes)."""
+    def _ends(self) -> tuple[FloatArray, FloatArray]:
+        """Ends of the cells in coordinates, shape (cells, axes)."""
         branches = self.arrays["branches"].astype(int)
         middles = self.arrays["middles"]
         low, high = np.empty((2, len(branches), len(self.axes)))
@@ -202,7 +203,7 @@ class FunctionTable:
             high[child, axis] = low[child + 1, axis] = middles[box]
         boxes = np.flatnonzero(branches[:, 0] == POLYNOMIAL)
         order = boxes[np.argsort(branches[boxes, 1])]
-        return order, low[order], high[order]
+        return low[order], high[order]
 
     def cells(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Lower and upper ends of the cells in coordinates of the axes, and stored bounds.
@@ -215,7 +216,7 @@ class FunctionTable:
         errors : ndarray, shape (cells, outputs)
             Bounds on the errors, relative or absolute as each output says.
         """
-        _, low, high = self._ends
+        low, high = self._ends
         return low.copy(), high.copy(), self.arrays["errors"].copy()
 
     def _columns(
@@ -389,9 +390,9 @@ class FunctionTable:
         return np.asarray(found)
 
     @shared_property
-    def _directions(self) -> tuple[NDArray[np.int64], FloatArray]:
-        """By output and axis 1, -1, or 0 where slopes of both signs occur, and a place of the other sign."""
-        _, low, high = self._ends
+    def _directions(self) -> NDArray[np.int64]:
+        """By output and axis 1 or -1, the sign of all slopes, or 0 where both signs occur."""
+        low, high = self._ends
         places = 0.5 * (1 + tests(len(self.axes)))
         t = low[:, None] + places * (high - low)[:, None]
         points = np.stack(
@@ -401,7 +402,7 @@ class FunctionTable:
         _, slopes, _, _ = self._answers(np.ascontiguousarray(points), True)
         rises = np.nanmin(slopes, axis=0) > 0
         falls = np.nanmax(slopes, axis=0) < 0
-        return rises.astype(int) - falls.astype(int), points[np.argmin(slopes, axis=0)]
+        return np.asarray(rises.astype(int) - falls.astype(int))
 
     def inverse(self, axis: str, **given: ArrayLike) -> tuple[Any, Any]:
         """The number on an axis at which an output has a value, and a bound on its error.
@@ -435,7 +436,7 @@ class FunctionTable:
                 f"give a value of one of {', '.join(outputs)}, got {len(asked)}"
             )
         k, a = outputs.index(asked[0]), names.index(axis)
-        direction = int(self._directions[0][k, a])
+        direction = int(self._directions[k, a])
         if direction == 0:
             raise InputError(
                 f"{asked[0]} increases along {axis} at some places and decreases at others, "
@@ -444,7 +445,7 @@ class FunctionTable:
         others = {name: value for name, value in given.items() if name != asked[0]}
         columns = self._columns((), others | {axis: self.axes[a].low})
         wanted = finite_array(asked[0], given[asked[0]])
-        x, shape = self._points([*columns, np.zeros(np.shape(wanted))][:-1])
+        x, shape = self._points(columns)
         whole = np.broadcast_shapes(shape, wanted.shape)
         index = np.broadcast_to(np.arange(len(x)).reshape(shape), whole).ravel()
         target = np.broadcast_to(wanted, whole).ravel()
@@ -551,20 +552,25 @@ class FunctionTable:
         )
 
 
-def read_function_table(path: os.PathLike[str] | str) -> FunctionTable:
-    """The table of a file, checked; TableFileError where it is damaged or of another kind."""
-    values, attributes = read_own(path, KIND, FORMAT, REMEDY)
+def table_in(dataset: netCDF4.Dataset) -> FunctionTable:
+    """The table of an open file, checked; ValueError where it is of another kind or does not fit together."""
+    values, attributes = own_content(dataset, KIND, FORMAT)
     try:
         axes = tuple(FunctionAxis(**entry) for entry in json.loads(attributes["axes"]))
         outputs = tuple(Output(**entry) for entry in json.loads(attributes["outputs"]))
         points = values["conformance_x"], values["conformance_exact"]
-        if [array.shape for array in points] != [
-            (len(points[0]), len(of)) for of in (axes, outputs)
-        ]:
+        shapes = [(len(points[0]), len(axes)), (len(points[0]), len(outputs))]
+        if [array.shape for array in points] != shapes:
             raise ValueError("has incomplete conformance points")
         return checked(FunctionTable(axes, outputs, values, attributes))
-    except (KeyError, TypeError, ValueError) as fault:
-        raise TableFileError(f"{path}: {fault}; {REMEDY}") from None
+    except (KeyError, TypeError) as fault:
+        raise ValueError(f"lacks what a table of a function has: {fault}") from None
+
+
+def read_function_table(path: os.PathLike[str] | str) -> FunctionTable:
+    """The table of a file, checked; TableFileError where it is damaged or of another kind."""
+    with opened(path, REMEDY) as dataset:
+        return table_in(dataset)
 
 
 def checked(table: FunctionTable) -> FunctionTable:

@@ -18,6 +18,7 @@ import pathlib
 import shutil
 import sys
 import time
+import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, cast
 
@@ -26,16 +27,19 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray, nearest
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import write_file
-from mbma_tables.common.netcdf import digest_json, write_own
+from mbma_tables.common.netcdf import write_own
 from mbma_tables.common.toml_files import check, read_toml
 from mbma_tables.common.workers import Crew, crew
 from mbma_tables.tables.boxes import (
-    NO_ANSWER,
+    MOST_HALVINGS,
+    PENDING,
     POLYNOMIAL,
     Aim,
+    Box,
     Piece,
     UnreachedError,
     UnsmoothError,
+    middle_of,
 )
 from mbma_tables.tables.function_table import (
     FORMAT,
@@ -65,6 +69,7 @@ DEFAULTS: dict[str, Any] = {
 }
 SAVED_EVERY = 5.0  # s, between two states of a piece that is not finished
 JOBS_AHEAD = 4  # jobs a worker between two looks at the clock
+ERROR_BLOCK = 1 << 14  # random points at a time
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,6 +95,14 @@ class Wanted:
     def as_json(self) -> str:
         """All of it as text."""
         return json.dumps(dataclasses.asdict(self), sort_keys=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> Wanted:
+        """Inverse of `as_json`."""
+        entries = json.loads(text)
+        entries["axes"] = tuple(FunctionAxis(**axis) for axis in entries["axes"])
+        entries["outputs"] = tuple(Output(**output) for output in entries["outputs"])
+        return cls(**entries)
 
     @property
     def aim(self) -> Aim:
@@ -338,19 +351,18 @@ def values_of(wanted: Wanted, x: FloatArray) -> FloatArray:
     names = tuple(output.name for output in wanted.outputs)
     # users' functions warn where they please; their values are checked here
     with np.errstate(all="ignore"):
-        if wanted.vectorized:
+        if not wanted.vectorized:
+            rows = _one_by_one(function, x, wanted, marks)
+        else:
             try:
                 found = function(*(np.ascontiguousarray(column) for column in x.T))
             except Exception as fault:
-                if not marks and len(x) == 1:
-                    raise InputError(_raised(wanted, fault, x[0])) from None
+                # the point that raises, if one does alone
                 rows = _one_by_one(function, x, wanted, marks)
                 if not marks:
                     raise InputError(_raised(wanted, fault, x[0])) from None
             else:
                 rows = _as_rows(found, names, len(x), wanted.function)
-        else:
-            rows = _one_by_one(function, x, wanted, marks)
     logs = np.array([output.transform == "log" for output in wanted.outputs])
     bad = ~np.isfinite(rows) | ((rows <= 0) & logs)
     if bad.any() and not marks:
@@ -367,33 +379,37 @@ def values_of(wanted: Wanted, x: FloatArray) -> FloatArray:
 # ---- pieces ----
 
 
-def pieces_of(wanted: Wanted) -> list[Piece]:
-    """The pieces of the range: halves of halves, the axes by turns."""
+def tree_of(wanted: Wanted) -> list[Box]:
+    """The range halved, the axes by turns, until there is a pending box for each piece."""
     low = np.array([float(axis.to_grid(axis.low)) for axis in wanted.axes])
     high = np.array([float(axis.to_grid(axis.high)) for axis in wanted.axes])
-    parts = [(low, high, np.zeros(low.size, dtype=np.int64))]
+    none = np.zeros(low.size, dtype=np.int64)
+    boxes = [Box(low, high, none, terms=())]
+    level = boxes
     axis = 0
-    while len(parts) < wanted.pieces:
-        halves = []
-        for first, last, halvings in parts:
-            middle = 0.5 * (first[axis] + last[axis])
-            more = halvings.copy()
-            more[axis] += 1
-            ends = last.copy(), first.copy()
-            ends[0][axis] = ends[1][axis] = middle
-            halves += [(first, ends[0], more), (ends[1], last, more.copy())]
-        parts = halves
+    while len(level) < wanted.pieces:
+        halves: list[Box] = []
+        for box in level:
+            box.axis, box.child = axis, len(boxes) + len(halves)
+            halves += box.halves(axis, terms=())
+        boxes = boxes + halves
+        level = halves
         axis = (axis + 1) % low.size
+    return boxes
+
+
+def pieces_of(wanted: Wanted) -> list[Piece]:
+    """The pieces of the range."""
+    parts = [box for box in tree_of(wanted) if box.axis == PENDING]
     points = math.ceil(wanted.certificate_points / wanted.pieces)
-    marks = wanted.on_failure == "mark"
     return [
         Piece(
-            *part,
+            part,
             wanted.aim,
             points,
             # rounds count on from here
             1000 * wanted.seed * wanted.pieces + 1000 * number,
-            marks,
+            wanted.on_failure == "mark",
             wanted.max_coefficients,
         )
         for number, part in enumerate(parts)
@@ -405,7 +421,6 @@ class Kept:
 
     def __init__(self, folder: pathlib.Path, wanted: Wanted) -> None:
         self.folder, self.wanted = folder, wanted
-        self.digest = digest_json(wanted.as_json)
 
     def begin(self, resume: bool) -> None:
         """Use the folder of an earlier run of the same configuration, or start a new one."""
@@ -417,8 +432,10 @@ class Kept:
                     "configuration to go on"
                 )
             return
-        if self.folder.exists():
+        if note.exists():
             shutil.rmtree(self.folder)
+        elif self.folder.exists():
+            raise InputError(f"{self.folder} holds something else than pieces of a table")
         write_file(note, self.wanted.as_json.encode(), make_folders=True)
 
     def path(self, number: int) -> pathlib.Path:
@@ -438,12 +455,16 @@ class Kept:
         if not path.exists():
             return none
         try:
-            with np.load(path, allow_pickle=False) as stored:
+            # opened here, as numpy leaves what is no archive open
+            with (
+                path.open("rb") as stream,
+                np.load(stream, allow_pickle=False) as stored,
+            ):
                 state = dict(stored)
             piece.restore(state)
-        except (OSError, ValueError, KeyError, EOFError) as fault:
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as fault:
             raise TableFileError(f"{path} is damaged ({fault}): remove it") from None
-        return np.asarray(state["values"]) if "values" in state else none
+        return np.asarray(state["values"])
 
 
 def _in_x(wanted: Wanted, t: FloatArray) -> FloatArray:
@@ -474,8 +495,8 @@ def grow(
                 (wanted, x[start : min(start + size, end)])
                 for start in range(len(values), end, size)
             ]
+            progress(end - len(values))
             values = np.concatenate([values, *run(values_of, jobs)])
-            progress(end - len(values) + sum(len(job[1]) for job in jobs))
             if time.monotonic() - saved > SAVED_EVERY:
                 kept.save(number, piece, values)
                 saved = time.monotonic()
@@ -485,7 +506,7 @@ def grow(
             place = _in_x(wanted, fault.place[None])[0]
             raise UnreachedError(
                 f"{wanted.function} is not smooth at {_at(wanted, place)}: the target of "
-                f"{wanted.target:g} is not reached in boxes of 2^-36 of the range; ask for a "
+                f"{wanted.target:g} is not reached in boxes of 2^-{MOST_HALVINGS} of the range; ask for a "
                 'larger target, or set on_failure = "mark" to refuse lookups there'
             ) from None
         values = np.empty((0, len(wanted.outputs)))
@@ -497,21 +518,26 @@ def grow(
 
 def table_of(wanted: Wanted, pieces: list[Piece]) -> FunctionTable:
     """The table of finished pieces."""
-    branches: list[tuple[int, int]] = []
-    middles: list[float] = []
-    cells: list[Any] = []
-    # a tree above the pieces, as they were halved
-    level = pieces
-    starts = _tree_above(wanted, branches, middles)
-    for start, piece in zip(starts, level, strict=True):
-        _append(piece, start, branches, middles, cells)
+    boxes = tree_of(wanted)
+    places = [number for number, box in enumerate(boxes) if box.axis == PENDING]
+    for place, piece in zip(places, pieces, strict=True):
+        # the first of its boxes stands in the tree, the others behind all
+        shift = len(boxes) - 1
+        moved = [dataclasses.replace(b, child=b.child + shift) for b in piece.boxes]
+        boxes[place] = moved[0]
+        boxes += moved[1:]
+    cells = [box for box in boxes if box.axis == POLYNOMIAL]
+    branches = np.array([(box.axis, box.child) for box in boxes], dtype=float)
+    branches[branches[:, 0] == POLYNOMIAL, 1] = np.arange(len(cells))
     sizes = [len(wanted.outputs) * math.prod(box.terms) for box in cells]
     arrays = {
-        "branches": np.array(branches, dtype=float),
-        "middles": np.array(middles),
+        "branches": branches,
+        "middles": np.array([middle_of(boxes, box) for box in boxes]),
         "starts": np.cumsum([0, *sizes])[:-1].astype(float),
         "terms": np.array([box.terms for box in cells], dtype=float),
-        "coefficients": np.concatenate([np.ravel(box.coefficients) for box in cells]),
+        "coefficients": np.concatenate(
+            [box.coefficients.ravel() for box in cells if box.coefficients is not None]
+        ),
         "errors": np.array([box.error for box in cells]),
     }
     replayed = zip(*(piece.replayed for piece in pieces), strict=True)
@@ -528,70 +554,25 @@ def table_of(wanted: Wanted, pieces: list[Piece]) -> FunctionTable:
     return checked(FunctionTable(wanted.axes, wanted.outputs, arrays, attributes))
 
 
-def _tree_above(
-    wanted: Wanted, branches: list[tuple[int, int]], middles: list[float]
-) -> list[int]:
-    """Boxes above the pieces, and the numbers of those that the pieces fill."""
-    low = [float(axis.to_grid(axis.low)) for axis in wanted.axes]
-    high = [float(axis.to_grid(axis.high)) for axis in wanted.axes]
-    level = [(0, low, high)]
-    branches.append((NO_ANSWER, -1))
-    middles.append(0.0)
-    axis = 0
-    while len(level) < wanted.pieces:
-        halves = []
-        for box, first, last in level:
-            middle = 0.5 * (first[axis] + last[axis])
-            child = len(branches)
-            branches[box], middles[box] = (axis, child), middle
-            branches += [(NO_ANSWER, -1)] * 2
-            middles += [0.0, 0.0]
-            ends = list(last), list(first)
-            ends[0][axis] = ends[1][axis] = middle
-            halves += [(child, first, ends[0]), (child + 1, ends[1], last)]
-        level = halves
-        axis = (axis + 1) % len(wanted.axes)
-    return [box for box, _, _ in level]
-
-
-def _append(
-    piece: Piece,
-    start: int,
-    branches: list[tuple[int, int]],
-    middles: list[float],
-    cells: list[Any],
-) -> None:
-    """A piece's boxes, the first of them in the place `start`, the others at the end."""
-    beyond = len(branches) - 1  # number of a box of the piece above 0, less its own
-    branches += [(NO_ANSWER, -1)] * (len(piece.boxes) - 1)
-    middles += [0.0] * (len(piece.boxes) - 1)
-    for number, box in enumerate(piece.boxes):
-        place = start if number == 0 else beyond + number
-        if box.axis >= 0:
-            branches[place] = (box.axis, beyond + box.child)
-            middles[place] = float(piece.boxes[box.child].high[box.axis])
-        elif box.axis == POLYNOMIAL:
-            branches[place] = (POLYNOMIAL, len(cells))
-            cells.append(box)
-
-
 def _attributes(wanted: Wanted, errors: FloatArray, excess: int) -> dict[str, str]:
     """What the file says of the table."""
     answered = errors[np.isfinite(errors).all(axis=1)]
     names = [output.name for output in wanted.outputs]
     if not len(answered):
         raise UnreachedError(f"{wanted.function} has no value at any held-out point")
+    statistics = {
+        "largest_error": answered.max(axis=0),
+        "p99_error": np.percentile(answered, 99, axis=0),
+        "median_error": np.median(answered, axis=0),
+    }
     certificate = {
         "held_out_points": len(answered),
         "without_answer": len(errors) - len(answered),
         "above_bound": excess,
-        "largest_error": dict(zip(names, answered.max(axis=0).tolist(), strict=True)),
-        "p99_error": dict(
-            zip(names, np.percentile(answered, 99, axis=0).tolist(), strict=True)
-        ),
-        "median_error": dict(
-            zip(names, np.median(answered, axis=0).tolist(), strict=True)
-        ),
+        **{
+            name: dict(zip(names, values.tolist(), strict=True))
+            for name, values in statistics.items()
+        },
     }
     return {
         "title": wanted.title or f"Table of {wanted.function}",
@@ -738,10 +719,7 @@ def merge(path: pathlib.Path, folders: list[pathlib.Path]) -> FunctionTable:
     for folder, note in notes.items():
         if note != notes[first]:
             raise InputError(f"{folder} is of another configuration than {first}")
-    entries = json.loads(notes[first])
-    axes = tuple(FunctionAxis(**axis) for axis in entries["axes"])
-    outputs = tuple(Output(**output) for output in entries["outputs"])
-    wanted = Wanted(**(entries | {"axes": axes, "outputs": outputs}))
+    wanted = Wanted.from_json(notes[first])
     pieces = pieces_of(wanted)
     unfinished = []
     for number, piece in enumerate(pieces):
@@ -777,30 +755,33 @@ def forecast(wanted: Wanted) -> str:
 def verified_errors(
     table: FunctionTable, count: int, seed: int = 0
 ) -> Iterator[FloatArray]:
-    """Errors of a table at fresh random points, in blocks, over the bounds that it states."""
-    wanted = json.loads(table.attributes["configuration"])
-    entries = wanted | {"axes": table.axes, "outputs": table.outputs}
-    configuration = Wanted(**entries)
-    draws = np.random.default_rng(seed)
-    for start in range(0, count, 1 << 14):
-        size = min(1 << 14, count - start)
-        low, high = (
-            np.array(
-                [float(a.to_grid(end)) for a, end in zip(table.axes, ends, strict=True)]
-            )
-            for ends in ([a.low for a in table.axes], [a.high for a in table.axes])
+    """What a table's answers are beside its function at fresh random points, in blocks.
+
+    Rows of each output are the absolute errors, the bounds that the table states, and the
+    magnitudes of the function; shape (outputs, 3, points).
+    """
+    wanted = Wanted.from_json(table.attributes["configuration"])
+    low, high = (
+        np.array(
+            [float(axis.to_grid(end)) for axis, end in zip(table.axes, ends, strict=True)]
         )
-        x = _in_x(configuration, low + (high - low) * draws.random((size, low.size)))
-        exact = values_of(configuration, x)
+        for ends in (
+            [axis.low for axis in table.axes],
+            [axis.high for axis in table.axes],
+        )
+    )
+    draws = np.random.default_rng(seed)
+    for start in range(0, count, ERROR_BLOCK):
+        size = min(ERROR_BLOCK, count - start)
+        x = _in_x(wanted, low + (high - low) * draws.random((size, low.size)))
+        exact = values_of(wanted, x)
         found = table.lookup(*x.T)
-        errors = [
-            np.stack(
-                [
-                    np.abs(found.values[o.name] - exact[:, k]),
-                    found.error[o.name],
-                    np.abs(exact[:, k]),
-                ]
-            )
-            for k, o in enumerate(table.outputs)
+        rows = [
+            [
+                np.abs(found.values[output.name] - exact[:, k]),
+                found.error[output.name],
+                np.abs(exact[:, k]),
+            ]
+            for k, output in enumerate(table.outputs)
         ]
-        yield np.stack(errors)
+        yield np.array(rows)

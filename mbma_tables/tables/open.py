@@ -10,13 +10,12 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.common.netcdf import HDF5_LOCK, kind_of
+from mbma_tables.common.netcdf import HDF5_LOCK
 from mbma_tables.common.shared import shared
 from mbma_tables.islands import greenwood_tripp
-from mbma_tables.tables.function_table import KIND as FUNCTION
-from mbma_tables.tables.function_table import FunctionTable, read_function_table
+from mbma_tables.tables.function_table import FunctionTable
 from mbma_tables.tables.island4d import Island4dModel, to_axes
-from mbma_tables.tables.reader import REMEDY, read_table
+from mbma_tables.tables.reader import read_any, read_table
 from mbma_tables.tables.schema import (
     ARGUMENTS,
     FUNCTIONS,
@@ -79,10 +78,10 @@ def open_table(
     >>> float(summed.error) < 1e-8
     True
     """
-    of_file = isinstance(table, str | os.PathLike) and table not in KINDS
-    if of_file and kind_of(table, REMEDY.format("KIND")) == FUNCTION:
-        return read_function_table(table)
-    return open_islands(table)
+    if not isinstance(table, str | os.PathLike) or table in KINDS:
+        return open_islands(table)
+    found = read_any(table)
+    return found if isinstance(found, FunctionTable) else _model(found)
 
 
 def open_islands(

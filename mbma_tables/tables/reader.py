@@ -9,6 +9,8 @@ import numpy as np
 
 from mbma_tables.common.netcdf import opened, verified
 from mbma_tables.tables import schema
+from mbma_tables.tables.function_table import KIND as FUNCTION
+from mbma_tables.tables.function_table import FunctionTable, table_in
 
 if TYPE_CHECKING:
     import netCDF4
@@ -54,22 +56,37 @@ def _content(dataset: netCDF4.Dataset, kind: str) -> schema.TableContent:
     )
 
 
+def content_in(dataset: netCDF4.Dataset, kind: str | None = None) -> schema.TableContent:
+    """The table of islands in an open file, checked, of a `kind` where one is given; else ValueError."""
+    table_kind, version = (
+        getattr(dataset, name, None) for name in ("mbma_kind", "format_version")
+    )
+    if table_kind not in schema.KINDS or (kind is not None and table_kind != kind):
+        raise ValueError(
+            f"holds a table of kind {table_kind!r}, not {kind or ' or '.join(schema.KINDS)}"
+        )
+    if version != schema.FORMAT_VERSIONS[table_kind]:
+        raise ValueError(
+            f"has format {version}, this library reads {schema.FORMAT_VERSIONS[table_kind]}"
+        )
+    content = _content(dataset, table_kind)
+    schema.check_content(content)
+    return content
+
+
 def read_table(
     path: os.PathLike[str] | str, kind: str | None = None
 ) -> schema.TableContent:
     """Open and check a table file, which must be of a `kind` where one is given."""
     with opened(path, REMEDY.format(kind or "KIND")) as dataset:
-        table_kind, version = (
-            getattr(dataset, name, None) for name in ("mbma_kind", "format_version")
-        )
-        if table_kind not in schema.KINDS or (kind is not None and table_kind != kind):
-            raise ValueError(
-                f"holds a table of kind {table_kind!r}, not {kind or ' or '.join(schema.KINDS)}"
-            )
-        if version != schema.FORMAT_VERSIONS[table_kind]:
-            raise ValueError(
-                f"has format {version}, this library reads {schema.FORMAT_VERSIONS[table_kind]}"
-            )
-        content = _content(dataset, table_kind)
-        schema.check_content(content)
-    return content
+        return content_in(dataset, kind)
+
+
+def read_any(
+    path: os.PathLike[str] | str, kind: str | None = None
+) -> schema.TableContent | FunctionTable:
+    """As `read_table`; a file of any kind may hold a table of a function, too."""
+    with opened(path, REMEDY.format(kind or "KIND")) as dataset:
+        if kind is None and getattr(dataset, "mbma_kind", None) == FUNCTION:
+            return table_in(dataset)
+        return content_in(dataset, kind)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import pathlib
 from collections.abc import Mapping
 
 import numpy as np
@@ -12,7 +11,8 @@ from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray, require
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.shared import shared, shared_property
+from mbma_tables.common.files import read_once
+from mbma_tables.common.shared import shared_property
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.tables.function_table import FunctionTable, read_function_table
@@ -29,12 +29,6 @@ OUTPUTS = ("pressure", "area")
 # module of the functions that shipped theories are tabulated by
 TOTALS = "mbma_tables.theories.totals"
 NO_SCATTER = "the scatter of the theory that this table stands for is not known: it is one of a user"
-
-
-@shared(8)
-def _read(path: pathlib.Path, state: tuple[int, int]) -> FunctionTable:
-    """The table of a file in a state, read once."""
-    return read_function_table(path)
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -76,12 +70,7 @@ class Tabulated(Theory):
     @shared_property
     def contents(self) -> FunctionTable:
         """The table."""
-        path = pathlib.Path(self.table)
-        try:
-            stat = path.stat()
-        except OSError:
-            return read_function_table(path)
-        return _read(path.resolve(), (stat.st_mtime_ns, stat.st_size))
+        return read_once(self.table, read_function_table)
 
     @property
     def stands_for(self) -> Theory | None:

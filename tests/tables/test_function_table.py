@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from mbma_tables import InputError, OutOfRangeError, TableFileError, open_table
 from mbma_tables.cli import main
 from mbma_tables.tables import make_function
-from mbma_tables.tables.boxes import UnreachedError
+from mbma_tables.tables.boxes import MOST_HALVINGS, Aim, Box, Piece, UnreachedError
 from mbma_tables.tables.make_function import make, merge, verified_errors, wanted_of
 
 UNIT = {"low": 0.0, "high": 1.0}
@@ -448,6 +448,48 @@ def test_the_command_makes_a_table(tmp_path, monkeypatch):
     assert "1 <= k <= n" in refused.output
 
 
+def a_piece(axes, width, target, seed=1, marks=False):
+    """A piece of one output with an absolute error, without files."""
+    aim = Aim(
+        np.array([target]), np.array([False]), np.array([1e-300]), np.array([False])
+    )
+    whole = Box(np.zeros(axes), np.full(axes, width), np.zeros(axes, int), ())
+    return Piece(whole, aim, 200, seed, marks, 10**6)
+
+
+def test_a_piece_goes_on_from_any_state():
+    """Also where a box that was a polynomial was found to miss the target, and cannot be halved any more."""
+    there, back = a_piece(1, 1.0, 1e-6), a_piece(1, 1.0, 1e-6, marks=True)
+    while not there.is_done:
+        x = there.points()[:, 0]
+        there.take(1 / (1 + 400 * (x - 0.37) ** 2)[:, None])
+        back.restore(there.state())
+        assert np.array_equal(back.points(), there.points())
+    lost = next(b for b in back.boxes if b.coefficients is not None)
+    lost.halvings[0] = MOST_HALVINGS
+    back._halve(lost, 0, lost.terms)
+    again = a_piece(1, 1.0, 1e-6)
+    again.restore(back.state())
+    for one, other in zip(back.boxes, again.boxes, strict=True):
+        assert (one.axis, one.child, one.terms) == (other.axis, other.child, other.terms)
+        assert np.array_equal(one.coefficients, other.coefficients)
+
+
+def test_folders_of_others_and_damaged_pieces_are_refused(tmp_path):
+    wanted = wanted_of(SMOOTH, target=1e-5)
+    folder = tmp_path / "t.nc.pieces"
+    folder.mkdir()
+    (folder / "thesis.txt").write_text("kept")
+    with pytest.raises(InputError, match="something else than pieces"):
+        make(wanted, tmp_path / "t.nc")
+    assert (folder / "thesis.txt").read_text() == "kept"
+    make(wanted, tmp_path / "a.nc", part=(1, 2))
+    piece = tmp_path / "a.nc.pieces" / "piece-000.npz"
+    piece.write_bytes(piece.read_bytes()[:-100])
+    with pytest.raises(TableFileError, match=r"piece-000.npz is damaged"):
+        make(wanted, tmp_path / "a.nc", resume=True)
+
+
 @settings(max_examples=20, deadline=None)
 @given(
     st.lists(st.floats(-2, 2), min_size=3, max_size=3),
@@ -456,13 +498,8 @@ def test_the_command_makes_a_table(tmp_path, monkeypatch):
 )
 def test_polynomials_are_tabulated_exactly(factors, width, seed):
     """A cubic in two numbers, by pieces alone, without files."""
-    from mbma_tables.tables.boxes import Aim, Piece
-
     a, b, c = factors
-    aim = Aim(np.array([1e-9]), np.array([False]), np.array([1e-300]), np.array([False]))
-    piece = Piece(
-        np.zeros(2), np.full(2, width), np.zeros(2, int), aim, 200, seed, False, 10**6
-    )
+    piece = a_piece(2, width, 1e-9, seed)
     while not piece.is_done:
         x, y = piece.points().T
         piece.take((a * x**3 + b * x * y * y + c)[:, None])

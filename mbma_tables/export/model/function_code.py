@@ -21,6 +21,7 @@ from mbma_tables.export.text import (
     core_file,
     filled,
     number,
+    numerals,
     opening,
     template,
 )
@@ -30,12 +31,8 @@ LINE = 118  # letters
 MAX_NAME = 40
 POINTS = 64  # of a self-test
 TOLERANCE = 1e-13  # relative, of a self-test
-POLICIES = {
-    "raise": "MBMA_REFUSED",
-    "nan": "MBMA_REFUSED",
-    "nearest": "MBMA_NEAREST",
-    "periodic": "MBMA_PERIODIC",
-}
+# of mbma.h, by the numbers of `IN_CORE`
+POLICIES = ("MBMA_REFUSED", "MBMA_NEAREST", "MBMA_PERIODIC")
 ENDS = {"c": "c", "fortran": "f90", "javascript": "mjs", "matlab": "m", "python": "py"}
 C_KEYWORDS = """
     auto break case char const continue default do double else enum extern float for goto if
@@ -46,14 +43,6 @@ MARKS = {"c": "/*", "fortran": "!", "javascript": "//", "matlab": "%", "python":
 LANGUAGES = tuple(MARKS)
 WHOLE = ("branches", "starts", "terms")  # arrays of whole numbers
 FORTRAN_PART = 60  # numbers of a DATA statement
-
-
-def _texts(values: Any) -> list[str]:
-    """Numbers as text, whole ones without a point."""
-    flat = np.ravel(values)
-    if (flat == np.round(flat)).all() and flat.dtype.kind == "i":
-        return [str(int(value)) for value in flat]
-    return [number(float(value)) for value in flat]
 
 
 def _lines(texts: Sequence[str], end: str = "") -> str:
@@ -115,7 +104,7 @@ def _parts(
 ) -> dict[str, Any]:
     """Places of the templates."""
     arrays = {
-        key: _texts(array.astype(int) if key in WHOLE else array)
+        key: numerals(array.astype(int) if key in WHOLE else array)
         for key, array in (table.core_arrays if language == "c" else table.arrays).items()
     }
     rows = [
@@ -139,8 +128,8 @@ def _parts(
         "lines": _lines,
         "data": _fortran_data,
         "fortran": lambda row: [_fortran_number(text) for text in row],
-        "points": _texts(points),
-        "expected": _texts(expected),
+        "points": numerals(points),
+        "expected": numerals(expected),
         "least": [
             number(size if output.error == "absolute" else output.least)
             for output, size in zip(
@@ -148,7 +137,7 @@ def _parts(
             )
         ],
         "tolerance": number(TOLERANCE),
-        "policies": POLICIES,
+        "policies": [POLICIES[IN_CORE[axis.outside]] for axis in table.axes],
         # at least 3, since compilers look at the recurrence from the third on
         "most_terms": max(int(terms.max()), 3),
         "most_products": int(terms.prod(axis=1).max()),

@@ -1,30 +1,15 @@
 """Island models by name, by a table's file, or as objects."""
 
-import functools
 import os
 import pathlib
 
 from mbma_tables.common.arguments import number_in
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.files import read_once
 from mbma_tables.islands import island_models as models
 from mbma_tables.islands.island_models import AnyModel
 from mbma_tables.islands.variants import Variant
 from mbma_tables.tables.open import open_islands
-
-
-@functools.lru_cache(maxsize=8)
-def _read(path: pathlib.Path, state: tuple[int, int] | None) -> AnyModel:
-    """The table of a file in a state, read once, so that theories of one file are equal."""
-    return open_islands(path)
-
-
-def _of_file(path: pathlib.Path) -> AnyModel:
-    """The table of a file as it is now."""
-    try:
-        stat = path.stat()
-    except OSError:
-        return open_islands(path)
-    return _read(path.resolve(), (stat.st_mtime_ns, stat.st_size))
 
 
 def with_table(island_model: str | os.PathLike[str] | AnyModel) -> str | AnyModel:
@@ -36,11 +21,12 @@ def with_table(island_model: str | os.PathLike[str] | AnyModel) -> str | AnyMode
         If the file is not there, damaged, or no table.
     """
     if isinstance(island_model, os.PathLike):
-        return _of_file(pathlib.Path(island_model))
+        return read_once(island_model, open_islands)
     if not isinstance(island_model, str) or island_model in models.ISLAND_MODELS:
         return island_model
     path = pathlib.Path(island_model)
-    return _of_file(path) if path.suffix == ".nc" or path.is_file() else island_model
+    is_file = path.suffix == ".nc" or path.is_file()
+    return read_once(path, open_islands) if is_file else island_model
 
 
 def get_model(island_model: str | AnyModel, rtol: float, variant: Variant) -> AnyModel:
