@@ -9,10 +9,17 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.contacts.law import block as at
-from mbma_tables.export.code.language import FOLDER, AskedLaw, evaluator
+from mbma_tables.export.code.language import (
+    FOLDER,
+    AskedLaw,
+    Language,
+    Program,
+    evaluator,
+)
 from mbma_tables.export.text import (
     braces,
     core_file,
+    number,
     numerals,
     template,
     wrapped,
@@ -34,10 +41,52 @@ CHECK = (
     *("gcc", "-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"),
     *("-fsyntax-only", "{file}"),
 )
+# prints the functions of a law at overclosures, for tests
+PROGRAM = """\
+#include <stdio.h>
+{% for function in functions %}
+double {{ name }}_{{ function }}(double c);
+{% endfor %}
+int main(void) {
+    FILE *in = fopen("c.txt", "r"), *out = fopen("values.txt", "w");
+    double c;
+    while (fscanf(in, "%lf", &c) == 1) {
+{% for function in functions %}
+        fprintf(out, "%.17g ", {{ name }}_{{ function }}(c));
+{% endfor %}
+        fprintf(out, "\\n");
+    }
+    return fclose(in) + fclose(out);
+}
+"""
 # functions that other files see, where they are made
 _DEFINED = re.compile(
     r"^(?!static|typedef|MBMA_INLINE)\w[\w *]*\b(mbma_\w+)\([^{;]*\{$", re.M
 )
+
+
+def c_language(usage: str, of_solver: str = "", **options: Any) -> Language:
+    """A language whose file is the core's C with a law's numbers.
+
+    `of_solver` has what the solver defines that calls it, for the program of tests.
+    """
+    return Language(
+        template="law.c",
+        evaluator="law.c",
+        check=CHECK,
+        mark="/*",
+        usage=usage,
+        call="{name}_{what}({x})",
+        program=Program(
+            "ask.c",
+            PROGRAM + of_solver,
+            ("gcc -std=c99 -O1 road.c ask.c -lm -o ask", "./ask"),
+            ".c",
+        ),
+        number=functools.partial(number, infinity="INFINITY", missing="(double)NAN"),
+        places=core_places,
+        **options,
+    )
 
 
 def blocks_of(asked: AskedLaw) -> dict[str, FloatArray]:

@@ -1,11 +1,9 @@
 """User subroutines of solvers in C: a law in the shape that a solver calls."""
 
-import functools
 from collections.abc import Mapping
 
-from mbma_tables.export.code.core_code import CHECK, core_places
-from mbma_tables.export.code.language import Language, Program
-from mbma_tables.export.text import number
+from mbma_tables.export.code.core_code import c_language
+from mbma_tables.export.code.language import Language
 
 LAST_VALUE = (
     "At pressures beyond the law's range the last value is used, with one warning on "
@@ -18,31 +16,6 @@ _INTERACTIONS = (
     'INTERFACE("{{interface}}", {{name}}) INTERFACE("SEAL", seal) and go on with the contents '
     "of {{name}}.c and seal.c, or #include both; the text in quotes is the name of the "
     "surface interaction, the other one that of the law."
-)
-
-
-PROGRAM = Program(
-    "ask.c",
-    """\
-#include <stdio.h>
-{% for function in functions %}
-double {{ name }}_{{ function }}(double c);
-{% endfor %}
-void xit_(void) {} /* of Abaqus */
-int main(void) {
-    FILE *in = fopen("c.txt", "r"), *out = fopen("values.txt", "w");
-    double c;
-    while (fscanf(in, "%lf", &c) == 1) {
-{% for function in functions %}
-        fprintf(out, "%.17g ", {{ name }}_{{ function }}(c));
-{% endfor %}
-        fprintf(out, "\\n");
-    }
-    return fclose(in) + fclose(out);
-}
-""",
-    ("gcc -std=c99 -O1 road.c ask.c -lm -o ask", "./ask"),
-    ".c",
 )
 
 
@@ -59,16 +32,9 @@ def subroutine(
     frictionless: bool = False,
 ) -> Language:
     """The C of a law with a routine, whose template is languages/ROUTINE.c."""
-    return Language(
-        template="law.c",
-        evaluator="law.c",
-        check=CHECK,
-        mark="/*",
-        usage=usage,
-        call="{name}_{what}({x})",
-        program=PROGRAM,
-        number=functools.partial(number, infinity="INFINITY", missing="(double)NAN"),
-        places=core_places,
+    return c_language(
+        usage,
+        of_solver="void xit_(void) {} /* of Abaqus */\n",
         parts=parts,
         subroutine=routine,
         conductance_alone=conductance_alone,
