@@ -1,1 +1,1 @@
-"""Contacts: the questions that surfaces, bodies and theories answer, and their results."""
+"""Contacts: questions, their answers, quantities and laws."""

@@ -1,1 +1,1 @@
-"""What a designer asks: joints, scenes, sensitivities."""
+"""What a designer asks: joints, scenes, derivatives, uncertainty."""

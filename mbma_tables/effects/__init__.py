@@ -1,1 +1,1 @@
-"""Physics that takes a contact: films of lubricant, rough spheres and cylinders."""
+"""Films of lubricant between rough faces; rough spheres and cylinders."""

@@ -1,1 +1,1 @@
-"""The island problem: variants of the paper, an island's geometry, its exact solution, and what an island model is."""
+"""The island problem: variants of the paper, geometry, solution."""

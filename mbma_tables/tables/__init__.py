@@ -1,1 +1,1 @@
-"""Surrogate tables of contact islands: made, certified, written, read and looked up."""
+"""Surrogate tables: made, certified, written, read, looked up."""
