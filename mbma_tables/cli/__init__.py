@@ -25,13 +25,30 @@ BAD_INPUT = 2
 INTERRUPTED = 130  # as shells report Ctrl-C
 
 
-# texts for Python, in a shell
-SAID = {
+# remedies for Python, in a shell
+REMEDIES = {
     "surface.fit()": "--model self-affine",
     "outside='exact'": "--island-model exact",
     "outside='nan'": "--outside nan",
     "give the surface its unit": "give --length-unit",
 }
+
+
+# the same for commands that read the options of a theory from a file
+ENTRIES = {
+    "outside='exact'": "--set island_model=exact",
+    "outside='nan'": "--set outside=nan",
+}
+
+
+def _for_a_shell(text: str, command: click.Command | None) -> str:
+    """`text` with its remedies as options of `command`, or as entries of the file that it reads."""
+    options = {
+        name for given in (command.params if command else ()) for name in given.opts
+    }
+    for python, shell in (ENTRIES if "--set" in options else REMEDIES).items():
+        text = text.replace(python, shell)
+    return text
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
@@ -62,9 +79,8 @@ class Program(click.Group):
             said = visible(" ".join(text.split()))
             if isinstance(fault, click.UsageError) and fault.ctx is not None:
                 said += f"\n(see '{fault.ctx.command_path} --help')"
-            for python, shell in SAID.items():
-                said = said.replace(python, shell)
-            click.echo(f"mbma: {said}", err=True)
+            command = self.commands.get(words[0]) if words else None
+            click.echo(f"mbma: {_for_a_shell(said, command)}", err=True)
             sys.exit(BAD_INPUT)
         sys.exit(code if isinstance(code, int) else 0)
 

@@ -87,3 +87,23 @@ def test_the_file_of_a_joint_is_no_scene_and_names_its_command(command):
     assert f"`mbma joint {path} --pressure 1MPa` has its results" in refused(
         command, str(path)
     )
+
+
+STEEP = {
+    "--Rq": "1 um",
+    "--hurst": "0.05",
+    "--longest": "100 um",
+    "--shortest": "1e-6 um",
+    "--nominal-area": "1 cm^2",
+    "--bodies": "70 GPa",
+    "--pressure": "0.1GPa",
+}
+
+
+def test_the_remedy_of_a_joint_is_an_option_that_its_command_has():
+    given = [word for pair in STEEP.items() for word in pair]
+    text = refused("joint", *given, "--set", "theory=mbma")
+    assert "--set island_model=exact solves these" in text
+    # the option is one of the theory's: another name in its place is refused by that option
+    given = [*given, "--set", "theory=mbma", "--set", "island_model=exactly"]
+    assert "exactly" in refused("joint", *given)
