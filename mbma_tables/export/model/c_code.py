@@ -22,6 +22,7 @@ from mbma_tables import __version__
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
+from mbma_tables.export.model.bindings import binding_texts
 from mbma_tables.export.model.conformance import (
     FORM,
     POINTS_FILE,
@@ -71,6 +72,13 @@ TYPES = {
 MODEL = ("mbma_model.h", "mbma_model.c", "mbma_data.c")
 SELFTEST = "mbma_selftest.c"
 SOURCES = (*CORE, *MODEL[1:], SELFTEST)
+# beside the C: its build, and modules of other languages, with the marks of their comments
+PACKAGE = {
+    "CMakeLists.txt": "#",
+    "mbma.pc.in": "#",
+    "mbma_model.f90": "!",
+    "mbma_model.rs": "//",
+}
 TIMEOUT = 300.0  # seconds, of a build or a replay
 # flags of the library; rounding does not depend on the compiler
 FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
@@ -131,6 +139,24 @@ def source_texts(
     )
     parts = {"FOUR": is_of_four, "LOOKUP": lookup_kind(model), "HEADER": heads[SELFTEST]}
     return texts | {SELFTEST: filled(f"model/{SELFTEST}", **parts)}
+
+
+def package_texts(
+    texts: Mapping[str, str], model: IslandTable, heads: dict[str, str]
+) -> dict[str, str]:
+    """What builds and installs the source files `texts` by CMake, and calls them from Fortran and Rust."""
+    build = filled(
+        "model/CMakeLists.txt",
+        HEADER=heads["CMakeLists.txt"],
+        VERSION=re.match(r"[\d.]*\d", __version__)[0],  # type: ignore[index]
+        SOURCES=" ".join((*core_sources(model), *MODEL[1:])),
+        FLAGS=" ".join(flag for flag in FLAGS if flag.startswith("-f")),
+        POINTS=POINTS_FILE,
+    )
+    return {
+        "CMakeLists.txt": build,
+        "mbma.pc.in": filled("model/mbma.pc.in", HEADER=heads["mbma.pc.in"]),
+    } | binding_texts(heads, texts["mbma.h"], texts["mbma_model.h"])
 
 
 def model_texts(heads: dict[str, str], is_of_four: bool = False) -> dict[str, str]:
@@ -389,6 +415,9 @@ def write_code(
 ) -> list[pathlib.Path]:
     """Write the model as C11, which C++ compiles too, with conformance points and a self-test that replays them.
 
+    Beside it are a build by CMake, which installs it for `find_package` and pkg-config, and
+    modules of Fortran and Rust that call it.
+
     A missing folder is made, files of the same names are replaced. Returns the files written.
     `table` is the file of a table to write in place of the shipped universal one; with a table
     of four numbers, which may be "island4d", `mbma_lookup_of` takes the place of `mbma_phi_of`.
@@ -402,11 +431,16 @@ def write_code(
     --------
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     [path.name for path in write_code(folder) if path.name.startswith("mbma_")]
-    ['mbma_model.h', 'mbma_model.c', 'mbma_data.c', 'mbma_selftest.c', 'mbma_conformance.csv']
+    ['mbma_model.h', 'mbma_model.c', 'mbma_data.c', 'mbma_selftest.c', 'mbma_conformance.csv', 'mbma_model.f90', 'mbma_model.rs']
     """
     rule = get_variant(variant)
     model = universal_model() if table is None else _table_of(table, rule)
     texts = source_texts(model, rule, table) | {POINTS_FILE: points_text(model, rule)}
+    heads = {
+        name: opening(header(name, model, rule, table), mark)
+        for name, mark in PACKAGE.items()
+    }
+    texts |= package_texts(texts, model, heads)
     for name, text in texts.items():
         write_file(pathlib.Path(folder, name), text.encode(), make_folders=True)
     return [pathlib.Path(folder, name) for name in texts]
