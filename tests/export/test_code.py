@@ -163,7 +163,8 @@ def test_every_file_says_what_it_is(tmp_path):
         if (core / path.name).is_file():
             assert text == (core / path.name).read_text(encoding="utf-8")
             continue
-        assert not re.search("@[A-Z_]+@", text)
+        # names between @ are filled in by CMake
+        assert path.suffix == ".in" or not re.search("@[A-Z_]+@", text)
         head = " ".join(
             word for word in text[:5000].split() if word not in ("*", "#", "!", "//")
         )
