@@ -8,21 +8,27 @@ import numpy as np
 from scipy.integrate import quad_vec
 
 from benchmarks.rows import report
-from mbma_tables import InputError, Scene, Surface, contact
+from mbma_tables import Bodies, InputError, Scene, Surface, contact
 from mbma_tables.theories import Mbma
 
 SCENES = 200
 GAPS = 4
 WARMED = 20  # scenes before times count: modules are loaded and tables opened by then
-EFFECTS = (
+REQUESTED = (
     ("pressure", "area"),
     ("energy",),
     ("stiffness",),
     ("pressure", "energy"),
-    ("pressure", "area", "comparison"),
-    ("area", "island_statistics"),
+    ("pressure", "area", "theories"),
+    ("area", "points"),
     ("pressure", "solid_conductance"),
 )
+# what is requested by another argument than quantities, and what a quantity needs
+MORE: dict[str, dict[str, Any]] = {
+    "theories": {"theories": ["greenwood_williamson"]},
+    "points": {"points": 64},
+    "solid_conductance": {"bodies": Bodies(conductivity=(50.0, 20.0))},
+}
 
 
 def truth(surface: Surface, gaps: np.ndarray, name: str) -> np.ndarray:
@@ -58,7 +64,7 @@ def truth(surface: Surface, gaps: np.ndarray, name: str) -> np.ndarray:
 
 
 def scenes(rng: np.random.Generator) -> None:
-    """Scenes of a random surface, gaps, effects and tolerance."""
+    """Scenes of a random surface, gaps, quantities and tolerance."""
     above: list[float] = []
     ratios: list[float] = []
     refused = 0
@@ -70,14 +76,13 @@ def scenes(rng: np.random.Generator) -> None:
         )
         gaps = np.sort(rng.uniform(-0.5, 0.99, GAPS)) * h_max
         rtol = 10 ** rng.uniform(-8, -1)
-        effects = EFFECTS[number % len(EFFECTS)]
-        extra: dict[str, Any] = (
-            {"theories": ["greenwood_williamson"]} if "comparison" in effects else {}
-        )
-        if "solid_conductance" in effects:
-            extra |= {"conductivities": (50.0, 20.0)}
+        requested = REQUESTED[number % len(REQUESTED)]
+        extra: dict[str, Any] = {}
+        for name in requested:
+            extra |= MORE.get(name, {})
+        names = [name for name in requested if name not in extra]
         try:
-            scene = Scene(surface, effects=effects, separations=gaps, rtol=rtol, **extra)
+            scene = Scene(surface, quantities=names, separation=gaps, rtol=rtol, **extra)
             plan = scene.plan()
             start = time.process_time()
             found = scene.run()

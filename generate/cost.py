@@ -24,7 +24,7 @@ from scipy.stats import qmc
 from generate import cost_distances
 from generate.files import ROOT, read_csv, to_csv
 from generate.timing import measure
-from mbma_tables import Scene, Surface, contact, contact_law, theories
+from mbma_tables import Bodies, Scene, Surface, contact, contact_law, theories
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.files import write_file
@@ -84,7 +84,7 @@ LAW_RTOLS = RTOLS[1:]
 SLOW_LAW_RTOLS = (1e-2, 1e-4)
 THEORY_LAW_RTOLS = (1e-3, 1e-5, 1e-7)
 MANY = 20_000  # gaps, about as many as a law begins to pay for
-# scenes that have one effect more than pressures and areas; a mean pressure keeps the plan
+# scenes that have one quantity, or a hardness, more than pressures and areas; a mean pressure keeps the plan
 # of theories that have its slopes at once from a law
 EFFECTS = {
     "base": ["area", "mean_pressure"],
@@ -92,8 +92,8 @@ EFFECTS = {
     "slopes": ["area", "stiffness"],
     "energy": ["area", "energy"],
     "leakage": ["area", "leakage"],
-    "yield": ["area", "yield"],
-    "yield inverse": ["area", "yield"],
+    "yield": ["area"],
+    "yield inverse": ["area"],
 }
 # gaps of those that take longer
 COUNTS = {"energy": 1000, "leakage": 1000}
@@ -258,7 +258,7 @@ def scene_rows() -> Iterator[Row]:
 
     def run_scene() -> Any:
         return Scene(
-            fresh(surface), effects=["pressure"], separations=gap, rtol=1e-4
+            fresh(surface), quantities=["pressure"], separation=gap, rtol=1e-4
         ).run()
 
     def its_step() -> Any:
@@ -384,21 +384,22 @@ def effect_rows() -> Iterator[Row]:
 
     def run(theory: str, part: str, count: int) -> Any:
         u = np.linspace(0.6, 0.95, count) * farthest
-        effects = EFFECTS[part]
+        asked = EFFECTS[part]
         if theory == "mbma" and part in ("base", "inverse"):
-            effects = ["pressure", "area"]
-        given: dict[str, Any] = {"mean_separations": u}
+            asked = ["pressure", "area"]
+        given: dict[str, Any] = {"mean_separation": u}
         pressure = contact(surface, mean_separation=u, theory=theory).pressure
         if "inverse" in part:
-            given = {"pressures": pressure}
+            given = {"pressure": pressure}
         if "yield" in part:
             # asperities yield, and the bulk does not
             at_most = float(surface.rms_gradient) / 2
-            given["hardness"] = max(at_most, 4 * float(np.max(pressure)))
+            hardness = max(at_most, 4 * float(np.max(pressure)))
+            given["bodies"] = Bodies(hardness=hardness)
 
         def scene() -> Any:
             made = Scene(
-                fresh(surface), effects=effects, theory=theory, rtol=1e-4, **given
+                fresh(surface), quantities=asked, theory=theory, rtol=1e-4, **given
             )
             return made.run()
 

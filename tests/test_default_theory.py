@@ -87,9 +87,9 @@ def test_contact_sensitivity_and_scene_of_one_question(expected, make, by):
 
     scene = Scene(
         surface,
-        effects=["pressure", "area", "stiffness"],
-        **{f"{by}s": [PLACES[by]]},
-        E_star=E_STAR,
+        E_STAR,
+        quantities=["pressure", "area", "stiffness"],
+        **{by: [PLACES[by]]},
     )
     content = scene.run()
     assert content.attrs["theory"] == expected
@@ -207,23 +207,9 @@ def test_a_map_and_its_fit_by_one_theory(tmp_path, monkeypatch):
 
 def test_parts_of_a_scene_that_only_mbma_has_make_it_mbmas():
     surface = of_numbers()
-    for part in (
-        {"island_model": "exact"},
-        {"variant": "printed"},
-        {"without": ["subscale_area"]},
-    ):
-        assert (
-            Scene(
-                surface, effects=["pressure"], pressures=[PRESSURE], E_star=E_STAR, **part
-            ).theory
-            == "mbma"
-        )
-    assert (
-        Scene(
-            surface, effects=["island_statistics"], pressures=[PRESSURE], E_star=E_STAR
-        ).theory
-        == "mbma"
-    )
+    for part in ({"points": 64}, {"deltas": [0.1]}, {"without": ["subscale_area"]}):
+        scene = Scene(surface, E_STAR, pressure=[PRESSURE], **part)
+        assert scene.theory == "mbma"
 
 
 def test_the_page_starts_with_the_law_of_the_surface_and_does_not_simulate():

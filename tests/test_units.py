@@ -190,9 +190,9 @@ test_conflicts_in_python = refusals(
         "no known unit of length",
     ),
     (lambda: CONCRETE.to(1.0), "a unit of length is a text"),
-    (lambda: Scene(PLAIN, separations=["1 um"]), "give the surface its unit"),
-    (lambda: Scene(CONCRETE, pressures=["1 MPa"]), "needs a modulus"),
-    (lambda: Scene(CONCRETE, pressures=["1 MPa"], E_star=9.0), "give E\\* with its unit"),
+    (lambda: Scene(PLAIN, separation=["1 um"]), "give the surface its unit"),
+    (lambda: Scene(CONCRETE, pressure=["1 MPa"]), "needs a modulus"),
+    (lambda: Scene(CONCRETE, 9.0, pressure=["1 MPa"]), "give E\\* with its unit"),
     (lambda: describe_law(PLAIN, "13 MPa", rows=9), "length_unit is missing"),
     (lambda: describe_law(CONCRETE, 13.0, rows=9), "stress_unit is missing"),
 )
@@ -392,7 +392,7 @@ def test_a_surface_that_is_its_own_spectrum_has_the_same_rule(theory):
     assert (law.x_unit, law.y_unit) == ("mm", "GPa")
     assert law.x[-1] == pytest.approx(1e-3 * surface.h_max, rel=1e-3)
     found = Scene(
-        surface, separations=["0.3e-3 mm"], E_star="100 GPa", theory=theory, rtol=1e-3
+        surface, "100 GPa", separation=["0.3e-3 mm"], theory=theory, rtol=1e-3
     ).run()
     assert (found["separation"].item(), found["pressure"].attrs["units"]) == (0.3, "GPa")
     with pytest.raises(InputError, match="give the surface its unit"):

@@ -25,7 +25,7 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.common.files import write_file
 from mbma_tables.contacts.measurement import curves, draw
-from mbma_tables.design.scenes.specimen import measured
+from mbma_tables.design.specimen import measured
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated, mirrored
 from mbma_tables.theories import BoundaryElements, resolve

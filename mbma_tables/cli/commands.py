@@ -14,7 +14,7 @@ from mbma_tables.common.arguments import finite_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.progress import echo
 from mbma_tables.contacts.quantities.registry import unit_of
-from mbma_tables.design.scenes.specimen import Specimen
+from mbma_tables.design.specimen import Specimen
 
 if TYPE_CHECKING:
     from mbma_tables.contacts.result import Contact
@@ -335,7 +335,7 @@ def fit_command(
         draw,
         table_of_loads,
     )
-    from mbma_tables.design.scenes.specimen import effective_modulus_of, measured
+    from mbma_tables.design.specimen import effective_modulus_of, measured
     from mbma_tables.surfaces.averages import average
     from mbma_tables.theories import Simulated, default_name, resolve
 

@@ -24,7 +24,7 @@ from mbma_tables.common.progress import echo
 from mbma_tables.common.units import Units
 from mbma_tables.contacts.quantities import registry
 from mbma_tables.contacts.quantities.registry import unit_of
-from mbma_tables.design.scenes.specimen import Specimen
+from mbma_tables.design.specimen import Specimen
 from mbma_tables.export.text import comment
 from mbma_tables.surfaces.surface import assumptions
 

@@ -15,8 +15,8 @@ import click
 from mbma_tables.bodies.bodies import Bodies
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import KINDS
-from mbma_tables.design.scenes import specimen as specimens
-from mbma_tables.design.scenes.specimen import Specimen
+from mbma_tables.design import specimen as specimens
+from mbma_tables.design.specimen import Specimen
 from mbma_tables.islands.island_models import ISLAND_MODELS
 from mbma_tables.islands.variants import NAMED
 from mbma_tables.surfaces.any_surface import AnySurface

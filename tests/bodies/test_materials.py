@@ -387,11 +387,9 @@ def test_sensitivities_hold_the_hardness(theory):
 def test_scenes_and_rows_take_every_hardness():
     pressures = ["10 MPa", "50 MPa"]
     scene = Scene(
-        surface=FACE,
-        pressures=pressures,
-        effects={"pressure", "area", "yield"},
-        E_star="115 GPa",
-        hardness="40 HRC",
+        FACE,
+        Bodies("115 GPa", hardness="40 HRC"),
+        pressure=pressures,
         theory="calibrated",
     )
     bodies = Bodies("115 GPa", hardness="392 HV")

@@ -16,7 +16,7 @@ from helpers import run, told
 from mbma_tables import Bodies, Surface, contact, island
 from mbma_tables.bodies.materials import effective_modulus
 from mbma_tables.cli import main
-from mbma_tables.design.scenes.specimen import MAP_OPTIONS, MATERIAL, NUMBERS, schema
+from mbma_tables.design.specimen import MAP_OPTIONS, MATERIAL, NUMBERS, schema
 from mbma_tables.theories import THEORIES, Mbma
 
 YANG_PERSSON = {
@@ -176,10 +176,8 @@ def test_every_source_is_the_same_surface(folder):
 
 def test_options_of_a_surface_are_arguments_of_the_library_and_names_of_scene_files():
     options = {parameter.name for parameter in main.commands["contact"].params}
-    surface, material = (
-        set(schema()["properties"][name]["properties"])
-        for name in ("surface", "material")
-    )
+    surface = set(schema()["properties"]["surface"]["properties"])
+    material = set(schema()["$defs"]["material"]["properties"])
     assert set(NUMBERS) | set(MAP_OPTIONS) | set(MATERIAL) <= options
     assert surface - {"name"} <= options
     assert set(NUMBERS) | set(MAP_OPTIONS) <= surface
@@ -386,7 +384,7 @@ def test_a_dash_is_standard_input_and_output(folder):
     assert text == (folder / "law.inp").read_text(encoding="utf-8").replace(
         "--out law.inp", "--out -"
     )
-    scene = "[surface]\nname = 'concrete'\n[prescribed]\nseparations = [0.5]\n[effects]\non = ['pressure']\n"
+    scene = "separation = [0.5]\n[surface]\nname = 'concrete'\n"
     found = CliRunner().invoke(main, ["run", "-", "--out", "-"], input=scene)
     assert (found.exit_code, found.stdout.splitlines()[0][:8]) == (0, "# mbma 0"), (
         found.output

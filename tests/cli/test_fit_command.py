@@ -9,7 +9,7 @@ from helpers import random_map, refused, run, topographies
 from mbma_tables import Surface
 from mbma_tables.common.errors import InputError
 from mbma_tables.contacts.measurement import table_of_loads
-from mbma_tables.design.scenes.specimen import read_specimen
+from mbma_tables.design.specimen import read_specimen
 
 library = topographies()
 POINTS = 64

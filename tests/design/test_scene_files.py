@@ -1,51 +1,51 @@
 """Mistakes in scene files: one message each, that says what to write instead."""
 
+import dataclasses
 import json
 import math
 import pathlib
 
+import numpy as np
 import pytest
 
 from mbma_tables import Scene
 from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.common.files import shipped_file
 from mbma_tables.contacts.quantities.registry import registry
-from mbma_tables.design.scenes import problem
 from mbma_tables.design.scenes.plan import Row, read_costs, shipped_costs
-from mbma_tables.design.scenes.problem import OTHERS, REFINEMENTS
-from mbma_tables.design.scenes.specimen import schema
+from mbma_tables.design.scenes.scene import REFINEMENTS
+from mbma_tables.design.specimen import schema
 from mbma_tables.theories import THEORIES
 
 EXAMPLES = pathlib.Path(__file__).parents[2] / "examples"
 
 
-def scene(
-    more="",
-    surface='name = "concrete"',
-    effects='on = ["pressure"]',
-    at="separations = [0.5]",
-):
+SURFACE = 'name = "concrete"'
+ASKED = {"quantities": '["pressure"]', "separation": "[0.5]"}
+
+
+def scene(more="", surface=SURFACE, **entries):
     """The text of a scene file, less what is None; `more` stands in front of the tables if it is no table itself."""
-    tables = {"surface": surface, "effects": effects, "prescribed": at}
-    text = "".join(
-        f"[{name}]\n{lines}\n" for name, lines in tables.items() if lines is not None
-    )
-    return text + more if more.startswith("[") else f"{more}\n{text}"
+    lines = [
+        f"{name} = {value}\n"
+        for name, value in (ASKED | entries).items()
+        if value is not None
+    ]
+    table = "" if surface is None else f"[surface]\n{surface}\n"
+    parts = [table, more] if more.startswith("[") else [more + "\n", table]
+    return "".join([*lines, *parts])
 
 
 MISTAKES = [
-    (scene("[efects]\non = []\n"), "did you mean 'effects'"),
+    (scene('quantites = ["area"]'), "did you mean 'quantities'"),
     (scene(surface='nme = "concrete"'), "did you mean 'name'"),
-    (scene(at="separation = 1"), "did you mean 'separations'"),
-    (scene("[material]\nhardness = 3.0"), r"it belongs to \[yield\]"),
-    (scene(effects='on = ["presure"]'), "'presure' is not one of"),
-    (scene(effects='on = ["pressure"]\noff = ["subscale"]'), "subscale_area"),
+    (scene("separations = 1"), "did you mean 'separation'"),
+    (scene("h_rms = 3.0"), r"it belongs to \[surface\]"),
+    (scene(quantities='["presure"]'), "'presure' is not one of"),
+    (scene(without='["subscale"]'), "subscale_area"),
     (scene(surface='name = "concret"'), "there are yang-persson"),
     (scene('variant = "printd"'), "'printd' is not one of"),
-    (
-        scene('[comparison]\ntheories = ["person"]', effects='on = ["comparison"]'),
-        "did you mean 'persson'",
-    ),
+    (scene(theories='["person"]'), "did you mean 'persson'"),
     (scene(surface=None), "'surface' is a required property"),
     (scene(surface="hurst = 0.8\nq0 = 1.0"), "a surface needs hurst, q0, q1"),
     (
@@ -55,46 +55,45 @@ MISTAKES = [
     (scene(surface='name = "concrete"\nmap = "a.nc"'), "one of name, map or numbers"),
     (scene(surface='map = "none.nc"'), "none.nc' is not a file"),
     (scene(surface='name = "concrete"\nlength_unit = "MPa"'), "no known unit of length"),
-    (scene(effects=None), "'effects' is a required property"),
-    (scene(effects="on = []"), "effects.on: .* should be non-empty"),
-    (scene(effects='on = ["pressure"]\noff = ["area"]'), "'area' is not one of"),
-    (scene(effects='on = ["energy"]\noff = ["finite_height"]'), "leave finite_height on"),
-    (scene(at=None), "give exactly one of separations"),
-    (scene('theory = "persons"'), "did you mean 'persson'"),
-    (scene(at="separations = [-2.0]"), "at least -h_max"),
+    (scene(quantities="[]"), "nothing is requested: give quantities"),
+    (scene(without='["area"]'), "'area' is not one of"),
     (
-        scene(
-            effects='on = ["pressure"]\noff = ["finite_height"]', at="pressures = [0.01]"
-        ),
-        "leave finite_height on, or give separations",
+        scene(quantities='["energy"]', without='["finite_height"]'),
+        "leave finite_height on",
+    ),
+    (scene(separation=None), "give exactly one of separation"),
+    (scene(theory='"persons"'), "did you mean 'persson'"),
+    (scene(separation="[-2.0]"), "at least -h_max"),
+    (
+        scene(without='["finite_height"]', separation=None, pressure="[0.01]"),
+        "leave finite_height on, or ask for pressure and area at a separation",
     ),
     (
-        scene(at='separations = ["a"]'),
-        "separations must be a number, or one with its unit, got 'a'",
+        scene(separation='["a"]'),
+        "separation must be a number, or one with its unit, got 'a'",
     ),
-    (scene("[accuracy]\nrtol = 1e-14"), "rtol: 1e-14 is less than the minimum of 1e-10"),
-    (scene("[accuracy]\nrtol = 1e-3\nseconds = 1.0"), "one of them"),
-    (scene("[accuracy]\nseconds = 0.0"), "0.0 is less than or equal to the minimum of 0"),
-    (scene("[material]\nE1 = 3.0"), "all of E1, nu1, E2, nu2"),
+    (scene(rtol="1e-14"), "rtol: 1e-14 is less than the minimum of 1e-10"),
+    (scene(rtol="1e-3", seconds="1.0"), "one of them"),
+    (scene(seconds="0.0"), "0.0 is less than or equal to the minimum of 0"),
+    (scene("[bodies]\nE = [3.0, 3.0]"), "E needs nu"),
+    (scene("[bodies]\nE_star = 3.0\nhardnes = 1.0"), "did you mean 'hardness'"),
     (
-        scene('[material]\nE1 = "210 GPa"\nnu1 = 0.3\nE2 = 70\nnu2 = 0.3'),
+        scene('[bodies]\nE = ["210 GPa", 70]\nnu = [0.3, 0.3]'),
         "E2 without a unit beside numbers in GPa",
     ),
-    (scene('[material]\nE_star = "210 mm"'), "no known unit of stress"),
-    (scene('[material]\nstress_unit = "MPa"'), "no modulus"),
+    (scene(bodies='"210 mm"'), "no known unit of stress"),
     (
         scene(surface='hurst = 0.8\nq0 = "0.1/mm"\nzeta_1 = 50\nh_rms = 0.8\nh_max = 3'),
         "h_rms, h_max without a unit",
     ),
-    (scene(effects='on = ["solid_conductance"]'), "needs conductivities"),
-    (scene("[solid_conductance]\nk1 = 1.0\nk2 = 1.0"), "add it to the effects"),
-    (scene(effects='on = ["pressure_profile"]', at=None), "needs deltas"),
+    (scene(quantities='["solid_conductance"]'), "needs conductivity"),
+    (scene(quantities="[]", deltas="[0.1]"), "separation is not needed for profiles"),
     (
         scene('surface = "concrete"', surface=None),
         r"surface: 'concrete' is not of type 'object'; write \[surface\]",
     ),
-    (scene(at=f"separations = [{10**400}]"), "must be real numbers"),
-    (scene(at="separations = " + "[" * 100_000), "is not a TOML file"),
+    (scene(separation=f"[{10**400}]"), "must be real numbers"),
+    (scene(separation="[" * 100_000), "is not a TOML file"),
     ("[surface\n", "is not a TOML file"),
 ]
 
@@ -121,11 +120,19 @@ def test_each_mistake_has_a_message_that_says_what_to_write_instead(
 
 def test_what_only_a_plan_or_a_run_can_know(tmp_path):
     for text, words in (
-        (scene("[accuracy]\nseconds = 1e-8"), "the cheapest plan takes"),
-        (scene("[accuracy]\nrtol = 1e-10", effects='on = ["energy"]'), "at best"),
+        (scene(seconds="1e-8"), "the cheapest plan takes"),
+        (scene(rtol="1e-10", quantities='["energy"]'), "at best"),
         (
-            'theory = "mbma"\n' + scene(at="pressures = [1e6]"),
+            scene(theory='"mbma"', separation=None, pressure="[1e6]"),
             "pressure must be at most what theory 'mbma' reaches on this surface",
+        ),
+        (
+            scene(
+                "[bodies]\nE_star = 1.0\nhardness = 0.1",
+                separation=None,
+                pressure="[0.2]",
+            ),
+            "pressure must be at most the hardness",
         ),
     ):
         with pytest.raises(MbmaError, match=words):
@@ -136,14 +143,56 @@ def test_examples_are_scenes_and_the_schema_names_what_the_code_knows():
     plans = [Scene.from_toml(path).explain() for path in EXAMPLES.glob("scene_*.toml")]
     assert len(plans) == 3
     assert all(text.startswith("Scene  (rtol=") for text in plans)
-    tables = schema()["properties"]
-    items = tables["effects"]["properties"]["on"]["items"]
-    assert set(items["enum"]) == {*OTHERS, *registry()}
-    path = pathlib.Path(problem.__file__).with_name("scene.schema.json")
-    published = json.loads(path.read_text())["properties"]["effects"]["properties"]["on"]
-    assert set(published["items"]["anyOf"][0]["enum"]) == set(OTHERS)
-    assert tuple(tables["effects"]["properties"]["off"]["items"]["enum"]) == REFINEMENTS
+    entries = schema()["properties"]
+    assert set(entries["quantities"]["items"]["enum"]) == {"leakage", *registry()}
+    assert tuple(entries["without"]["items"]["enum"]) == REFINEMENTS
+    arguments = {field.name for field in dataclasses.fields(Scene) if field.init}
+    assert set(entries) == arguments | {"variant", "island_model"}
     json.dumps(schema(), allow_nan=False)
+
+
+def test_the_files_of_the_page_are_scenes(tmp_path):
+    page = (EXAMPLES.parent / "docs" / "scenes.md").read_text(encoding="utf-8")
+    whole, bodies = (block.split("```")[0] for block in page.split("```toml\n")[1:])
+    found = Scene.from_toml(write(tmp_path, whole)).run()
+    assert found["solid_conductance"].attrs["units"] == "W/(m^2 K)"
+    given = "\n".join(line for line in whole.split("\n") if "bodies" not in line)
+    scene = Scene.from_toml(write(tmp_path, given + bodies))
+    assert float(scene.in_units.hardness) == 1.2
+    assert scene.run().attrs["theory"] == "calibrated"
+
+
+# first and last numbers of the examples, as computed when scenes had tables of effects
+KEPT = {
+    "joint": {
+        "separation": (3.123154464016858e-06, 3.89194494837839e-07),
+        "area": (8.019657919870567e-06, 8.401661168922669e-03),
+        "stiffness": (93596169650.66568, 33072150093412.227),
+        "solid_conductance": (46.637719978301504, 16479.410224731855),
+    },
+    "rigid": {
+        "pressure": (3.761643201707689e-05, 4.634523816957057e-04),
+        "area": (7.741419838189296e-05, 9.191438740688065e-04),
+    },
+    "road": {
+        "pressure": (1.918198356359841e-07, 0.09345043191737323),
+        "area": (4.726918313713212e-08, 0.01820734395363279),
+        "island_number": (1.3162659807368108e-4, 0.6586820621057403),
+        "greenwood_williamson_pressure": (2.110153032697451e-05, 2.1194363869322963),
+        "persson_area": (7.600152785316556e-05, 0.0058186656341277735),
+    },
+}
+
+
+@pytest.mark.parametrize("name", KEPT)
+def test_the_examples_give_the_numbers_that_they_gave(name):
+    found = Scene.from_toml(EXAMPLES / f"scene_{name}.toml").run()
+    for quantity, ends in KEPT[name].items():
+        values = found[quantity].values[[0, -1]]
+        np.testing.assert_allclose(values, ends, rtol=1e-9, err_msg=quantity)
+    if name == "road":
+        assert found["profile_pressure"].values[0, 0] == pytest.approx(1.0844949312081604)
+        assert found["island_force"].values[1] == pytest.approx(4.6368279316600684e-09)
 
 
 HEADER = ",".join(Row._fields)

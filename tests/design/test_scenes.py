@@ -13,6 +13,7 @@ from helpers import refusals
 from scipy.integrate import quad
 
 from mbma_tables import (
+    Bodies,
     ConvergenceError,
     OutOfRangeError,
     Scene,
@@ -25,8 +26,7 @@ from mbma_tables import (
 from mbma_tables.contacts.quantities import declaration, registry
 from mbma_tables.design.scenes import plan as plans
 from mbma_tables.design.scenes import run as runs
-from mbma_tables.design.scenes.problem import ELASTIC, GROUPS, OTHERS
-from mbma_tables.islands.island_models import answer_islands
+from mbma_tables.islands.island_models import RigidModel, answer_islands
 from mbma_tables.islands.variants import REPORTED
 from mbma_tables.theories import GreenwoodWilliamson, Mbma, Persson
 from mbma_tables.theories.mbma.island import scale_area
@@ -35,28 +35,33 @@ from mbma_tables.theories.yielding.theory import Yielding
 
 CONCRETE = Surface.named("concrete")
 GAPS = (0.2, 0.5, 0.9)
+# what is requested by other arguments than quantities
 PARTS = {
-    "yield": {"hardness": 0.1},
-    "solid_conductance": {"conductivities": (1.0, 3.0)},
-    "pressure_profile": {"deltas": [0.1]},
-    "comparison": {"theories": ("greenwood_williamson",)},
+    "yield": {"bodies": Bodies(hardness=0.1)},
+    "deltas": {"deltas": [0.1]},
+    "points": {"points": 64},
+    "theories": {"theories": ("greenwood_williamson",)},
 }
 
 
-def arguments_of(effects, more=()):
-    parts = {
-        name: value for effect in effects for name, value in PARTS.get(effect, {}).items()
-    }
-    gaps = (
-        {}
-        if set(effects) == {"pressure_profile"} or "pressures" in more
-        else {"separations": GAPS}
-    )
-    return {"effects": effects, "rtol": 1e-3} | parts | gaps
+def arguments_of(requested, more=()):
+    quantities = [name for name in requested if name not in PARTS]
+    given = {"quantities": quantities, "rtol": 1e-3}
+    for name in requested:
+        given |= PARTS.get(name, {})
+    if "solid_conductance" in requested:
+        hardness = 0.1 if "yield" in requested else None
+        E_star = more.get("bodies", 1.0) if more else 1.0
+        given["bodies"] = Bodies(E_star, hardness=hardness, conductivity=(1.0, 3.0))
+    if "yield" in requested and not quantities:
+        given["quantities"] = ["pressure"]
+    if set(requested) != {"deltas"} and "pressure" not in more:
+        given["separation"] = GAPS
+    return given
 
 
-def scene_of(*effects, **more):
-    return Scene(CONCRETE, **(arguments_of(effects, more) | {"rtol": 1e-6} | more))
+def scene_of(*requested, **more):
+    return Scene(CONCRETE, **(arguments_of(requested, more) | {"rtol": 1e-6} | more))
 
 
 @pytest.mark.parametrize("rtol", [1e-1, 1e-3, 1e-5, 1e-7, 1e-9])
@@ -74,7 +79,8 @@ def test_totals_are_within_the_tolerance(rtol):
 def test_pressures_stiffness_and_energy(rtol):
     exact = contact_law(CONCRETE, 2.0, theory="mbma", rtol=1e-9)
     pressures = exact.pressure(separation=np.array(GAPS))
-    more = {"pressures": pressures, "E_star": 2.0, "rtol": rtol, "theory": "mbma"}
+    bodies = Bodies(2.0, conductivity=(1.0, 3.0))
+    more = {"pressure": pressures, "bodies": bodies, "rtol": rtol, "theory": "mbma"}
     found = scene_of(
         "pressure", "area", "stiffness", "energy", "solid_conductance", **more
     ).run()
@@ -134,8 +140,8 @@ def hertz_area(gap):
 def test_hertz_area_is_the_area_over_eta(surface):
     found = Scene(
         surface,
-        separations=GAPS,
-        effects=("area",),
+        separation=GAPS,
+        quantities=("area",),
         without=("subscale_area",),
         rtol=1e-6,
     ).run()
@@ -147,9 +153,9 @@ def test_hertz_area_is_the_area_over_eta(surface):
 def test_the_whole_gaussian_adds_force_and_reaches_beyond_h_max():
     gaps = [0.3, 1.0, 1.3]
     whole = scene_of(
-        "pressure", separations=gaps, without=("finite_height",), rtol=1e-5
+        "pressure", separation=gaps, without=("finite_height",), rtol=1e-5
     ).run()
-    cut = scene_of("pressure", separations=gaps, rtol=1e-5).run()
+    cut = scene_of("pressure", separation=gaps, rtol=1e-5).run()
     # far below h_max what lies beyond it is less than the table's error
     assert whole["pressure"][0] == pytest.approx(float(cut["pressure"][0]), rel=1e-9)
     assert (whole["pressure"][1:] > cut["pressure"][1:]).all()
@@ -160,7 +166,7 @@ def test_the_whole_gaussian_adds_force_and_reaches_beyond_h_max():
 
 
 def test_island_statistics_add_up():
-    found = scene_of("pressure", "island_statistics", points=4000).run()
+    found = scene_of("pressure", points=4000).run()
     delta = found["island_delta"].values
     density = found["island_density"].values
     load = np.trapezoid(density * found["island_force"].values, delta, axis=1)
@@ -168,7 +174,7 @@ def test_island_statistics_add_up():
     np.testing.assert_allclose(
         np.trapezoid(density, delta, axis=1), found["island_number"], rtol=2e-2
     )
-    found = scene_of("pressure_profile", deltas=[0.1, 0.4], E_star=3.0, rtol=1e-8).run()
+    found = scene_of("deltas", deltas=[0.1, 0.4], bodies=3.0, rtol=1e-8).run()
     r = found["profile_radius"].values
     p = found["profile_pressure"].values
     load = 2 * np.pi * np.trapezoid(r * p, r, axis=1)
@@ -201,12 +207,12 @@ if sys.argv[1] == "used":
     for island_model in ("exact", "universal", "island4d", "formula", "rigid"):
         contact(concrete, separation=[0.1, 0.7], theory=Mbma(island_model, rtol=1e-3))
     contact_law(concrete, theory="mbma", rtol=1e-4)
-    Scene(Surface.named("asphalt"), effects=["pressure", "energy"], separations=[0.1], rtol=0.05).run()
-    Scene(concrete, effects=["pressure_profile"], deltas=[0.2]).run()
-model = {"effects": ["pressure"], "without": ["sphere_deformation"], "rtol": 1e-3}
-islands = {"effects": ["area", "stiffness", "island_statistics"], "rtol": 1e-3}
+    Scene(Surface.named("asphalt"), quantities=["pressure", "energy"], separation=[0.1], rtol=0.05).run()
+    Scene(concrete, deltas=[0.2]).run()
+model = {"quantities": ["pressure"], "without": ["sphere_deformation"], "rtol": 1e-3}
+islands = {"quantities": ["area", "stiffness"], "points": 64, "rtol": 1e-3}
 for arguments in (*({"rtol": rtol} for rtol in (0.05, 1e-6, 1e-9)), {"seconds": 0.01}, model, islands):
-    scene = Scene(concrete, separations=[0.2, 0.5, 0.9], **arguments)
+    scene = Scene(concrete, separation=[0.2, 0.5, 0.9], **arguments)
     found = scene.run()
     print(scene.explain(), found.attrs["error"].hex(), found.attrs["island_models"])
     for name in sorted(found.variables):
@@ -242,7 +248,7 @@ def test_a_plan_and_a_result_name_what_they_are_made_of():
         "switched off: subscale_area\n",
     ):
         assert part in text
-    found = scene_of("pressure", rtol=1e-8, variant="printed").run()
+    found = scene_of("pressure", rtol=1e-8, theory=Mbma(variant="printed")).run()
     assert found.attrs["variant"] == "printed"
     assert set(json.loads(found.attrs["table_hashes"])) <= set(
         json.loads(found.attrs["island_models"]).values()
@@ -251,17 +257,26 @@ def test_a_plan_and_a_result_name_what_they_are_made_of():
     assert found["separation"].attrs["units"] == "mm"
 
 
-OF_CONTACT = ("pressure", "area", "stiffness", "energy", "solid_conductance", *GROUPS)
-TRIED = (*OF_CONTACT, *[name for name in OTHERS if name not in GROUPS])
+OF_CONTACT = (
+    "pressure",
+    "area",
+    "stiffness",
+    "energy",
+    "solid_conductance",
+    "leakage",
+    "valid",
+    "yield",
+)
+TRIED = (*OF_CONTACT, "points", "deltas", "theories")
 COMBINATIONS = [
     names
     for names in [(name,) for name in TRIED] + list(itertools.combinations(TRIED, 2))
-    if not ("yield" in names and set(names) & set(ELASTIC))
+    if not ("yield" in names and set(names) & {"energy", "points", "deltas"})
 ]
 
 
-@pytest.mark.parametrize("effects", COMBINATIONS, ids="+".join)
-def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
+@pytest.mark.parametrize("requested", COMBINATIONS, ids="+".join)
+def test_kernels_of_what_is_not_requested_are_not_called(requested, monkeypatch):
     calls = {}
 
     def count(module, name, called):
@@ -273,7 +288,8 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
 
         monkeypatch.setattr(module, name, counted)
 
-    count(importlib.import_module("mbma_tables.contacts.contact"), "contact", "contact")
+    module = importlib.import_module("mbma_tables.contacts.contact")
+    count(module, "contact_of", "contact")
     count(
         importlib.import_module("mbma_tables.contacts.law.make"),
         "contact_law",
@@ -289,25 +305,26 @@ def test_kernels_of_an_effect_that_is_off_are_not_called(effects, monkeypatch):
     for theory in (GreenwoodWilliamson, Persson):
         count(theory, "answer", theory.name)
     count(Yielding, "__init__", "yield")
-    Scene(CONCRETE, **arguments_of(effects)).run()
-    asked = set(effects)
-    yields = "yield" in effects
+    given = arguments_of(requested)
+    Scene(CONCRETE, **given).run()
+    asked = {*requested, *given["quantities"]}
+    yields = "yield" in requested
     expected = {
         "contact": int(bool(asked & set(OF_CONTACT))),
         "leakage": int("leakage" in asked),
-        "island_statistics": int("island_statistics" in asked),
-        "profiles": int("pressure_profile" in asked),
-        "greenwood_williamson": int("comparison" in asked),
+        "island_statistics": int("points" in asked),
+        "profiles": int("deltas" in asked),
+        "greenwood_williamson": int("theories" in asked),
     }
     found = {name: len(called) for name, called in calls.items() if name != "yield"}
-    if yields and "comparison" in asked:
+    if yields and "theories" in asked:
         # the load at which heights yield is solved for
         found["greenwood_williamson"] = min(found["greenwood_williamson"], 1)
     assert found == {name: times for name, times in expected.items() if times}
     assert ("yield" in calls) == yields
 
 
-@pytest.mark.parametrize("name", ["comparison", "pressure_profile"])
+@pytest.mark.parametrize("name", ["theories", "deltas"])
 def test_tables_are_not_read_where_nothing_looks_up(name, monkeypatch):
     from mbma_tables.tables import open as tabulated
 
@@ -333,7 +350,7 @@ def test_tables_are_not_read_where_nothing_looks_up(name, monkeypatch):
     ],
 )
 def test_stiffness_at_the_end_of_a_laws_piece(surface, gap, rtol):
-    found = Scene(surface, effects=("stiffness",), separations=[gap], rtol=rtol).run()
+    found = Scene(surface, quantities=("stiffness",), separation=[gap], rtol=rtol).run()
     truth = contact(surface, separation=gap, theory=Mbma(rtol=1e-11)).stiffness
     assert abs(float(found["stiffness"][0]) / truth - 1) <= found.attrs["error"] <= rtol
 
@@ -344,7 +361,7 @@ DEEP = Surface(0.8, 1.0, 200.0, 1.0, 45.0)
 
 def scene_with(surface=CONCRETE, **given):
     return Scene(
-        surface, **({"effects": ("pressure",), "separations": (0.2, 0.5)} | given)
+        surface, **({"quantities": ("pressure",), "separation": (0.2, 0.5)} | given)
     )
 
 
@@ -361,7 +378,7 @@ def with_island_model(scene, island_model):
 
 @pytest.mark.parametrize("island_model", ["universal", "island4d"])
 def test_beyond_a_table_totals_are_solved(island_model):
-    scene = scene_with(DEEP, separations=(-44.0, 44.0), rtol=1e-3)
+    scene = scene_with(DEEP, separation=(-44.0, 44.0), rtol=1e-3)
     with pytest.raises(OutOfRangeError):
         contact(DEEP, separation=-44.0, theory=Mbma(island_model=island_model))
     found = runs.run_plan(scene, with_island_model(scene, island_model))
@@ -373,40 +390,42 @@ def test_beyond_a_table_totals_are_solved(island_model):
 
 test_contradictions = refusals(
     lambda given: scene_with(**given),
-    ({"effects": ("finite_height",)}, "no effect is named 'finite_height'"),
+    ({"quantities": ("finite_height",)}, "no quantity is named 'finite_height'"),
     (
         {"without": ("energy",)},
         "no refinement is named 'energy'; known are subscale_area, sphere_deformation",
     ),
-    ({"effects": ()}, "on needs at least one of"),
+    ({"quantities": ()}, "nothing is requested: give quantities"),
     (
-        {
-            "effects": ("pressure", "pressure_profile"),
-            "deltas": (0.1,),
-            "without": ("sphere_deformation",),
-        },
-        "pressure_profile is that of the deformed sphere",
+        {"deltas": (0.1,), "without": ("sphere_deformation",)},
+        "deltas are of profiles of the deformed sphere",
     ),
-    ({"effects": ("solid_conductance",), "conductivities": (1.0, -2.0)}, "positive"),
+    ({"bodies": Bodies(conductivity=(1.0, -2.0))}, "positive"),
+    ({"quantities": (), "deltas": (0.1,)}, "separation is not needed for profiles"),
+    ({"deltas": (0.1, -0.2)}, "deltas must be positive"),
+    ({"deltas": (0.1, np.nan)}, "deltas must be finite"),
+    ({"pressure": 0.1}, "give exactly one of separation"),
     (
-        {"effects": ("pressure_profile",), "deltas": (0.1,)},
-        "are not needed by any effect",
+        {"theory": Mbma(island_model="exact"), "without": ("sphere_deformation",)},
+        "leave island_model out",
     ),
     (
-        {"island_model": "exact", "without": ("sphere_deformation",)},
-        "leave island model out",
+        {"theory": Mbma(island_model=RigidModel()), "seconds": 1.0},
+        "give rtol instead of seconds",
     ),
-    ({"island_model": object(), "seconds": 1.0}, "give rtol instead of seconds"),
-    ({"effects": "pressure"}, "list of names"),
-    ({"effects": 5}, "list of names"),
-    ({"separations": [[0.5]]}, "one number or a list"),
+    ({"quantities": "pressure"}, "list of names"),
+    ({"quantities": 5}, "list of names"),
+    ({"quantities": (["area"],)}, "quantity"),
+    ({"bodies": [57.0, 58.0]}, "a scene has one E_star"),
+    ({"bodies": Bodies(hardness=[0.1, 0.2])}, "a scene has one hardness"),
+    ({"separation": [[0.5]]}, "one number or a list"),
     ({"points": 1}, "points must be"),
     ({"surface": Surface([0.5, 0.7], 1.0, 50.0, 0.1, 0.3)}, "not a batch"),
 )
 
 
 def test_an_island_model_of_choice():
-    found = scene_with(island_model="island4d", rtol=1e-3).run()
+    found = scene_with(theory=Mbma(island_model="island4d"), rtol=1e-3).run()
     assert found.attrs["island_models"] == '{"contact": "island4d"}'
     alone = contact(
         CONCRETE, separation=[0.2, 0.5], theory=Mbma(island_model="island4d", rtol=5e-4)
@@ -415,22 +434,21 @@ def test_an_island_model_of_choice():
     with pytest.raises(
         ConvergenceError, match=r"above rtol = 1\.00e-06: give a larger rtol"
     ):
-        scene_with(island_model="formula", rtol=1e-6).run()
+        scene_with(theory=Mbma(island_model="formula"), rtol=1e-6).run()
 
 
 def test_no_contact():
-    by_area = Scene(CONCRETE, effects=["pressure", "stiffness"], areas=[0.0]).run()
+    by_area = Scene(CONCRETE, quantities=["pressure", "stiffness"], area=[0.0]).run()
     assert by_area.separation.values == pytest.approx(1.1)
     assert (by_area.pressure.values, by_area.stiffness.values) == (0, 0)
     assert (
         scene_with(
-            effects=("stiffness",), separations=(2 * CONCRETE.h_max,), rtol=1e-4
+            quantities=("stiffness",), separation=(2 * CONCRETE.h_max,), rtol=1e-4
         ).run()["stiffness"]
         == 0
     )
     found = scene_with(
-        effects=("pressure", "island_statistics"),
-        separations=(CONCRETE.h_max, 2.0),
+        separation=(CONCRETE.h_max, 2.0),
         points=5,
     ).run()
     for name in (
@@ -445,11 +463,11 @@ def test_no_contact():
 
 
 def test_validity_and_yield_are_what_the_declarations_of_quantities_say():
-    """A quantity declared with an uncertainty of its own is in `validity` without any list of scenes."""
-    more = {"pressures": [0.05], "E_star": "13.3 MPa", "theory": "calibrated"}
-    asked = {"effects": ["solid_conductance", "validity", "yield"], "hardness": "0.2 MPa"}
-    given = more | asked | {"conductivities": ("2 W/(m K)", "2 W/(m K)")}
-    found = Scene(CONCRETE, **given).run()
+    """A quantity declared with an uncertainty of its own is beside `valid` without any list of scenes."""
+    bodies = Bodies("13.3 MPa", hardness="0.2 MPa", conductivity="2 W/(m K)")
+    asked = ["solid_conductance", "valid"]
+    given = {"pressure": [0.05], "theory": "calibrated", "quantities": asked}
+    found = Scene(CONCRETE, bodies, **given).run()
     uncertainties = {each.uncertainty for each in registry.registry().values()}
     of_gas = {"gas_conductance_scatter", "total_conductance_scatter", "leakage_scatter"}
     assert uncertainties - {None} - of_gas <= set(found.variables)

@@ -18,7 +18,7 @@ each = pytest.mark.parametrize("theory", THEORIES)
 
 
 def scene_of(theory, **more):
-    given = {"effects": ("pressure", "area"), "E_star": MODULUS, "rtol": 1e-4} | more
+    given = {"bodies": MODULUS, "rtol": 1e-4} | more
     return Scene(CONCRETE, theory=theory, **given)
 
 
@@ -26,9 +26,9 @@ def scene_of(theory, **more):
     "theory", [*THEORIES, Springs()], ids=lambda t: getattr(t, "name", t)
 )
 def test_quantities_at_a_pressure_are_the_contacts(theory):
-    found = scene_of(
-        theory, effects=QUANTITIES, pressures=PRESSURES, conductivities=(1.0, 3.0)
-    ).run()
+    bodies = Bodies(MODULUS, conductivity=(1.0, 3.0))
+    asked = {"quantities": QUANTITIES, "pressure": PRESSURES, "bodies": bodies}
+    found = scene_of(theory, **asked).run()
     truth = contact(CONCRETE, MODULUS, pressure=PRESSURES, theory=theory)
     expected = {
         "separation": truth.separation,
@@ -49,7 +49,7 @@ def test_quantities_at_a_pressure_are_the_contacts(theory):
 @each
 @pytest.mark.parametrize(
     "prescribed",
-    [{"pressures": PRESSURES}, {"mean_separations": np.linspace(0.3, 1.0, 50)}],
+    [{"pressure": PRESSURES}, {"mean_separation": np.linspace(0.3, 1.0, 50)}],
 )
 def test_time_budgets(theory, prescribed):
     ample = scene_of(theory, rtol=None, seconds=60.0, **prescribed)
@@ -76,7 +76,7 @@ def test_many_gaps_go_through_the_law_where_that_costs_less(theory):
     some = slice(None, None, 3700)
     truth = contact(CONCRETE, MODULUS, mean_separation=u[some], theory=theory)
     for asked, by_law, seen in ((u, True, some), (u[some], False, slice(None))):
-        scene = scene_of(theory, mean_separations=asked, rtol=rtol)
+        scene = scene_of(theory, mean_separation=asked, rtol=rtol)
         (step,) = scene.plan().steps
         assert (step.name == "law") == (by_law and theory != "mbma")
         found = scene.run()
@@ -84,16 +84,16 @@ def test_many_gaps_go_through_the_law_where_that_costs_less(theory):
         assert found["area"].values[seen] == pytest.approx(truth.area, rel=rtol)
     # slopes are the theory's own
     slopes = scene_of(
-        theory, effects=("stiffness",), mean_separations=u[some], rtol=rtol
+        theory, quantities=("stiffness",), mean_separation=u[some], rtol=rtol
     ).run()
     assert slopes["stiffness"].values == pytest.approx(truth.stiffness, rel=1e-5)
 
 
 @each
-def test_validity_is_an_effect(theory):
+def test_validity_is_a_quantity(theory):
     # of gaps that are numbers, so that both are asked the same
     u = (CONCRETE.h_max + np.array([0.5, -1.0])) / 2
-    scene = scene_of(theory, effects=("pressure", "validity"), mean_separations=u)
+    scene = scene_of(theory, quantities=("pressure", "valid"), mean_separation=u)
     text = scene.explain()
     found = scene.run()
     assert f"  theory: {theory}\n" in text
@@ -105,51 +105,42 @@ def test_validity_is_an_effect(theory):
     np.testing.assert_array_equal(found["scatter"], truth.scatter)
     np.testing.assert_array_equal(found["area_scatter"], truth.area_scatter)
     assert set(json.loads(found.attrs["reasons"])) == set(truth.reasons)
-    assert "valid" not in scene_of(theory, mean_separations=u).run()
+    assert "valid" not in scene_of(theory, mean_separation=u).run()
 
 
 test_what_is_refused = refusals(
-    lambda more: scene_of(**({"theory": "persson", "separations": [0.5]} | more)).run(),
+    lambda more: scene_of(**({"theory": "persson", "separation": [0.5]} | more)).run(),
     ({"theory": "person"}, "no theory is named 'person'; did you mean 'persson'"),
-    ({"island_model": "exact"}, "island_model: of theory 'mbma', not of 'persson'"),
-    ({"variant": "printed"}, "variant: of theory 'mbma'"),
     ({"without": ("sphere_deformation",)}, "without: of theory 'mbma'"),
-    ({"effects": ("island_statistics",)}, "effect 'island_statistics': of theory 'mbma'"),
+    ({"points": 64}, "points: of theory 'mbma', not of 'persson'"),
+    ({"deltas": [0.1]}, "deltas: of theory 'mbma', not of 'persson'"),
+    ({"theories": ("persson",)}, "by theory 'persson' itself"),
     (
-        {"effects": ("comparison",), "theories": ("persson",)},
-        "by theory 'persson' itself",
+        {"area": [0.1]},
+        "give exactly one of separation, mean_separation, pressure, area; got ",
     ),
-    (
-        {"areas": [0.1]},
-        "give exactly one of separations, mean_separations, pressures, areas; got ",
-    ),
-    ({"separations": None, "areas": [-0.1]}, "areas must be at least 0"),
+    ({"separation": None, "area": [-0.1]}, "area must be at least 0"),
     ({"theory": 3}, "theory must be one of"),
 )
 
 
 SURFACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0)
-PRESSED = {"surface": SURFACE, "pressures": [1.0, 30.0], "E_star": 100e3}
+PRESSED = {"surface": SURFACE, "pressure": [1.0, 30.0]}
 
 
 @pytest.mark.parametrize("theory", ["calibrated", "mbma"])
 def test_a_scene_yields_as_contact_does(theory):
-    effects = ["pressure", "area", "stiffness", "solid_conductance", "validity", "yield"]
-    scene = Scene(
-        **PRESSED,
-        effects=effects,
-        hardness=1500.0,
-        theory=theory,
-        conductivities=(16.0, 167.0),
-    )
+    asked = ["pressure", "area", "stiffness", "solid_conductance", "valid"]
+    bodies = Bodies(100e3, hardness=1500.0, conductivity=(16.0, 167.0))
+    scene = Scene(**PRESSED, bodies=bodies, quantities=asked, theory=theory)
     step = scene.plan().steps[0]
-    assert "yield" in step.why
+    assert "hardness" in step.why
     assert step.error < 1e-4
     found = scene.run()
     known = contact(
         SURFACE,
         Bodies(100e3, hardness=1500.0),
-        pressure=PRESSED["pressures"],
+        pressure=PRESSED["pressure"],
         theory=theory,
     )
     for name in (
@@ -175,17 +166,18 @@ def test_a_scene_yields_as_contact_does(theory):
 
 @pytest.mark.parametrize("cap", [{}, {"hardness": 1500.0}], ids=["elastic", "yield"])
 def test_theories_beside_one_another(cap):
-    asked = {"mean_separations": [0.5, 1.5], "E_star": 100e3} | cap
     others = ["persson", "calibrated"]
-    effects = ["pressure", "area", "comparison", *(["yield"] if cap else [])]
-    found = Scene(SURFACE, effects, theories=others, theory="mbma", **asked).run()
+    asked = {"mean_separation": [0.5, 1.5], "theories": others, "theory": "mbma"}
+    found = Scene(SURFACE, Bodies(100e3, **cap), **asked).run()
     for name in others:
         known = contact_of(SURFACE, 100e3, mean_separation=[0.5, 1.5], theory=name, **cap)
         for quantity in ("pressure", "area"):
             assert found[f"{name}_{quantity}"].values == pytest.approx(
                 getattr(known, quantity), rel=1e-9
             )
-    elastic = Scene(**PRESSED, effects=["area"], theory="calibrated").run()
+    elastic = Scene(
+        **PRESSED, bodies=100e3, quantities=["area"], theory="calibrated"
+    ).run()
     known = contact(SURFACE, 100e3, pressure=1.0, theory="calibrated")
     assert elastic.attrs["elastic_hardness"] == pytest.approx(known.elastic_hardness)
     assert f"elastic_hardness {float(known.elastic_hardness):.4g}" in repr(known)
@@ -201,12 +193,14 @@ def test_a_file_may_call_for_it():
             "h_max": 3.0,
             "length_unit": "um",
         },
-        "material": {"E_star": "100 GPa"},
+        "bodies": {
+            "E_star": "100 GPa",
+            "hardness": "1500 MPa",
+            "conductivity": ["16 W/(m K)", "167 W/(m K)"],
+        },
         "theory": "calibrated",
-        "effects": {"on": ["area", "yield", "solid_conductance"]},
-        "yield": {"hardness": "1500 MPa"},
-        "solid_conductance": {"k1": "16 W/(m K)", "k2": "167 W/(m K)"},
-        "prescribed": {"pressures": ["30 MPa"]},
+        "quantities": ["area", "solid_conductance"],
+        "pressure": ["30 MPa"],
     }
     found = Scene.from_mapping(content).run()
     known = contact(
@@ -225,32 +219,27 @@ def test_a_file_may_call_for_it():
 
 test_what_contradicts = refusals(
     lambda more: Scene(**PRESSED, **more),
-    ({"effects": ["area", "yield"]}, "effect 'yield' needs hardness"),
-    ({"hardness": 1500.0}, "hardness given and effect 'yield' is off"),
     (
-        {"effects": ["energy", "yield"], "hardness": 1500.0},
-        "'energy' is for elastic contacts",
+        {"quantities": ["energy"], "bodies": Bodies(hardness=50.0)},
+        "energy needs an elastic contact",
     ),
     (
-        {"effects": ["area", "yield"], "hardness": 1500.0, "without": ["finite_height"]},
-        "is for elastic contacts",
+        {"bodies": Bodies(hardness=50.0), "without": ["finite_height"]},
+        "without: of elastic contacts",
     ),
-    (
-        {"effects": ["area", "yield"], "hardness": 20.0},
-        "pressures must be at most the hardness",
-    ),
-    ({"effects": ["area", "yield"], "hardness": -1.0}, "hardness must be a number in"),
+    ({"bodies": Bodies(hardness=50.0), "points": 9}, "points: of elastic contacts"),
+    ({"bodies": Bodies(hardness=-1.0)}, "hardness must be positive"),
 )
 
 
 def test_a_plan_of_mbma_that_yields_keeps_the_tolerance():
     known = {
         "surface": SURFACE,
-        "mean_separations": [1.0],
-        "effects": ["pressure", "yield"],
-        "hardness": 0.01,
+        "mean_separation": [1.0],
+        "quantities": ["pressure"],
+        "bodies": Bodies(hardness=0.01),
+        "theory": "mbma",
     }
-    known |= {"theory": "mbma"}
     for rtol, island_model in ((1e-6, "universal"), (1e-10, "exact")):
         scene = Scene(**known, rtol=rtol)
         assert scene.plan().error <= rtol
@@ -268,27 +257,39 @@ def test_a_plan_of_mbma_that_yields_keeps_the_tolerance():
         Scene(**known | {"theory": Springs()}, seconds=10.0).plan()
 
 
-def test_options_of_mbma_as_an_object_are_those_of_the_scene():
-    asked = {"separations": [0.5, 0.7], "without": ["subscale_area"]}
-    options = {"island_model": "exact", "variant": "printed", "rtol": 1e-4}
-    named = Scene(CONCRETE, theory="mbma", **options, **asked).run()
-    for scene in (
-        Scene(CONCRETE, theory=Mbma(**options), **asked),
-        Scene(
-            CONCRETE,
-            theory=Mbma(variant="printed"),
-            **asked,
-            rtol=1e-4,
-            island_model="exact",
-        ),
-    ):
-        found = scene.run()
-        for name in ("theory", "variant", "rtol"):
-            assert found.attrs[name] == named.attrs[name]
-        np.testing.assert_array_equal(found["pressure"], named["pressure"])
+def test_what_the_plan_chooses_can_be_given_by_the_theory():
+    asked = {"separation": [0.5, 0.7], "without": ["subscale_area"]}
+    options = {"island_model": "exact", "variant": "printed"}
+    found = Scene(CONCRETE, theory=Mbma(**options, rtol=1e-4), **asked).run()
+    assert set(json.loads(found.attrs["island_models"]).values()) == {"exact"}
+    assert (found.attrs["variant"], found.attrs["rtol"]) == ("printed", 1e-4)
+    beside = Scene(CONCRETE, theory=Mbma(**options), **asked, rtol=1e-4).run()
+    surface = {"name": "concrete"}
+    of_file = Scene.from_mapping({"surface": surface, "rtol": 1e-4} | options | asked)
+    for other in (beside, of_file.run()):
+        for name in ("theory", "variant", "rtol", "island_models"):
+            assert other.attrs[name] == found.attrs[name]
+        np.testing.assert_array_equal(other["pressure"], found["pressure"])
     for given, said in (
-        ({"theory": Mbma(rtol=1e-4), "rtol": 1e-6}, "rtol is given by the scene and by"),
+        ({"theory": Mbma(rtol=1e-4), "rtol": 1e-6}, "rtol and rtol of the theory are"),
         ({"theory": Mbma(outside="nan")}, "outside: a scene solves"),
     ):
         with pytest.raises(InputError, match=said):
             Scene(CONCRETE, **asked, **given)
+    with pytest.raises(InputError, match="island_model: options of theory 'mbma' alone"):
+        Scene.from_mapping(
+            {"surface": surface, "theory": "persson", "island_model": "exact"}
+        )
+
+
+def test_bodies_are_those_of_contacts():
+    """A scene took a modulus, a hardness and conductivities by names of its own, and no metals."""
+    metals = ("steel 4140 hard", "aluminium 6061 hard")
+    surface = Surface(0.8, 0.01, 2.0, 1.0, 3.0, unit="um")
+    asked = {"pressure": ["30 MPa"], "theory": "calibrated"}
+    quantities = ["area", "solid_conductance", "tangential_stiffness"]
+    found = Scene(surface, metals, **asked, quantities=quantities).run()
+    known = contact(surface, metals, **asked)
+    for name in (*quantities, "yielded", "plane_separation"):
+        np.testing.assert_allclose(found[name], known.quantity(name), rtol=1e-9)
+        assert found[name].attrs["units"] == known.units[name]

@@ -9,7 +9,7 @@ from generate.boundary_elements.run import GRIDS
 from generate.files import ROOT, read_csv
 from generate.pages import cost as pages_cost
 from generate.timing import measure
-from mbma_tables import Scene, Surface, contact
+from mbma_tables import Bodies, Scene, Surface, contact
 from mbma_tables.design.scenes.plan import read_costs, shipped_costs, shipped_distances
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.theories import THEORIES, Mbma
@@ -97,33 +97,35 @@ def test_totals_laws_and_theories(monkeypatch):
 
 
 SURFACE = Surface(0.8, 0.0126, 0.8, 0.8, 3.2, unit="um")
-GAPS_OF_SCENES = {"separations": (0.2, 2.5), "pressures": (1e-4, 1e-2)}
+GAPS_OF_SCENES = {"separation": (0.2, 2.5), "pressure": (1e-4, 1e-2)}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("theory", "count", "by", "effects"),
+    ("theory", "count", "by", "quantities"),
     [
-        ("mbma", 1000, "pressures", ["area", "yield"]),
-        ("mbma", 1000, "separations", ["leakage"]),
-        ("mbma", 20_000, "pressures", ["area", "stiffness"]),
-        ("calibrated", 20_000, "separations", ["area", "yield"]),
-        ("calibrated", 1000, "pressures", ["area", "yield"]),
-        ("calibrated", 1, "separations", ["energy"]),
-        ("persson", 20_000, "pressures", ["area", "yield"]),
-        ("greenwood_williamson", 20_000, "pressures", ["area", "yield"]),
-        ("greenwood_williamson", 1, "pressures", ["area", "stiffness"]),
+        ("mbma", 1000, "pressure", ["area", "yielded"]),
+        ("mbma", 1000, "separation", ["leakage"]),
+        ("mbma", 20_000, "pressure", ["area", "stiffness"]),
+        ("calibrated", 20_000, "separation", ["area", "yielded"]),
+        ("calibrated", 1000, "pressure", ["area", "yielded"]),
+        ("calibrated", 1, "separation", ["energy"]),
+        ("persson", 20_000, "pressure", ["area", "yielded"]),
+        ("greenwood_williamson", 20_000, "pressure", ["area", "yielded"]),
+        ("greenwood_williamson", 1, "pressure", ["area", "stiffness"]),
     ],
 )
-def test_a_scene_of_another_surface_costs_what_its_plan_says(theory, count, by, effects):
+def test_a_scene_of_another_surface_costs_what_its_plan_says(
+    theory, count, by, quantities
+):
     """Within 2, in units of the fixed work: one of many candidates, none of it cached."""
     gaps = np.geomspace(*GAPS_OF_SCENES[by], count)
-    hardness = {"hardness": "2 GPa"} if "yield" in effects else {}
+    bodies = Bodies("100 GPa", hardness="2 GPa" if "yielded" in quantities else None)
 
     def scene():
         surface = cost.fresh(SURFACE)
-        given = {by: gaps, "E_star": "100 GPa", "theory": theory, "rtol": 1e-4}
-        return Scene(surface, effects, **given, **hardness)
+        given = {by: gaps, "theory": theory, "rtol": 1e-4}
+        return Scene(surface, bodies, quantities=quantities, **given)
 
     planned = scene().plan().seconds / shipped_costs().seconds
     measured, _ = measure(lambda: scene().run())

@@ -314,9 +314,8 @@ def test_totals_laws_islands_and_scenes():
     np.testing.assert_allclose(
         law.pressure(separation=OWN_GAPS), known.pressure(separation=OWN_GAPS), rtol=1e-12
     )
-    scene = Scene(
-        FLAT, effects=("pressure",), separations=[1.0], rtol=1e-4, island_model=Own()
-    ).run()
+    theory = Mbma(island_model=Own())
+    scene = Scene(FLAT, separation=[1.0], rtol=1e-4, theory=theory).run()
     expected = contact(FLAT, separation=1.0, theory=Mbma(island_model="rigid")).pressure
     assert float(scene["pressure"][0]) == pytest.approx(expected, rel=1e-4, abs=0)
 

@@ -15,7 +15,7 @@ from scipy.stats import norm
 
 from generate.boundary_elements.surfaces import Recipe, heights
 from mbma_tables import InputError, OutOfRangeError, Surface, contact
-from mbma_tables.design.scenes.specimen import from_numbers
+from mbma_tables.design.specimen import from_numbers
 from mbma_tables.surfaces.heights import highest_point
 from mbma_tables.surfaces.roughness import areal_parameters, core
 

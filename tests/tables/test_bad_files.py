@@ -89,10 +89,12 @@ def test_a_bad_file_is_a_typed_error_of_every_class_that_takes_one(spoil, tmp_pa
         "island_model": "bad.nc",
         "part_a": {"Rq": "1 um", "hurst": 0.8, "longest": "6 um", "shortest": "0.2 um"},
     }
+    numbers = {"hurst": 0.8, "q0": 1.0, "q1": 30.0, "h_rms": 1.0, "h_max": 3.0}
+    scene = {"surface": numbers, "separation": 2.0, "island_model": "bad.nc"}
     for take in (
         lambda: open_table(path),
         lambda: Mbma(island_model=path),
-        lambda: Scene(SURFACE, separations=[2.0], island_model=path, theory="mbma"),
+        lambda: Scene.from_mapping(scene, tmp_path),
         lambda: Joint.from_entries(entries, tmp_path / "joint.toml"),
     ):
         with pytest.raises(TableFileError, match=r"bad\.nc: .*`mbma tables make "):

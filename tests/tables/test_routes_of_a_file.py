@@ -36,18 +36,15 @@ GAP = 2.0
 SCENE = """
 theory = "mbma"
 island_model = {model!r}
+quantities = ["pressure"]
+separation = [2.0]
+rtol = 0.05
 [surface]
 hurst = 0.8
 q0 = 1.0
 q1 = 30.0
 h_rms = 1.0
 h_max = 3.0
-[effects]
-on = ["pressure"]
-[prescribed]
-separations = [2.0]
-[accuracy]
-rtol = 0.05
 """
 
 
@@ -94,9 +91,7 @@ def by_law(table, folder):
 
 
 def by_scene(table, folder):
-    scene = Scene(
-        SURFACE, separations=[GAP], island_model=table, theory="mbma", rtol=0.05
-    )
+    scene = Scene(SURFACE, separation=[GAP], theory=Mbma(island_model=table), rtol=0.05)
     assert 0 < scene.plan().error < 0.1
     return scene.run()["pressure"].values[0]
 
@@ -146,16 +141,14 @@ def by_sensitivity(table, folder):
 
 def by_plan(table, folder):
     """The plan's error is the certificate's, and its cost that of the kind of table."""
-    scene = Scene(
-        SURFACE, separations=[GAP], island_model=table, theory="mbma", rtol=0.05
-    )
+    scene = Scene(SURFACE, separation=[GAP], theory=Mbma(island_model=table), rtol=0.05)
     plan = scene.plan()
     (step,) = (step for step in plan.steps if step.island_model is not None)
     certificate = open_table(table).content.attributes
     largest = max(certificate[f"largest_error_{name}"] for name in "FA")
     assert step.error == pytest.approx(step.rtol + largest)
     kind = open_table(table).name
-    alike = Scene(SURFACE, separations=[GAP], island_model=kind, theory="mbma", rtol=0.05)
+    alike = Scene(SURFACE, separation=[GAP], theory=Mbma(island_model=kind), rtol=0.05)
     assert plan.seconds == alike.plan().seconds > 0
     found = scene.run()
     assert found.attrs["error"] > 0

@@ -117,7 +117,7 @@ def test_every_route_takes_the_file(files):
     )
     for theory in (file, Tabulated(file)):
         scene = Scene(
-            FACE, effects=["pressure"], separations=[0.2], theory=theory, rtol=1e-3
+            FACE, quantities=["pressure"], separation=[0.2], theory=theory, rtol=1e-3
         )
         by_mbma = contact(FACE, separation=0.2, theory="mbma").pressure
         assert float(scene.run()["pressure"][0]) == pytest.approx(

@@ -75,12 +75,16 @@ class Quantity:
         """Whether a contact shows it without being asked."""
         return self.is_available(state) and self.is_listed(state)
 
-    def of(self, state: State) -> Any:
-        """Its value, or an error that names what is missing."""
+    def require_given(self, state: State) -> None:
+        """Raise an error that names what is missing, where anything is."""
         if missing := self.missing(state):
             remedies = "; ".join(dict.fromkeys(need.remedy for need in missing))
             names = " and ".join(need.name for need in missing)
             raise MissingError(f"{self.name} needs {names}, which is missing: {remedies}")
+
+    def of(self, state: State) -> Any:
+        """Its value, or an error that names what is missing."""
+        self.require_given(state)
         # ratios may be infinite or undefined where bodies do not touch
         with np.errstate(divide="ignore", invalid="ignore"):
             return self.compute(state)

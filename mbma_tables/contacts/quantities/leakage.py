@@ -567,6 +567,7 @@ def flow_coefficient(contact: State) -> Any:
 @quantity(
     Dimension(length=1),
     "hydraulic aperture K^(1/3)",
+    made_of=("flow_coefficient",),
     is_column=False,
     is_listed=on_request,
 )
@@ -578,6 +579,7 @@ def hydraulic_aperture(contact: State) -> Any:
 @quantity(
     DIMENSIONLESS,
     "model uncertainty: standard deviation of ln K",
+    made_of=("flow_coefficient",),
     is_column=False,
     is_listed=on_request,
 )

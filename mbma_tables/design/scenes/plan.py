@@ -1,4 +1,4 @@
-"""The plan of a scene: its steps from effects and tolerance, by the costs of tables/cost.csv.
+"""The plan of a scene: its steps from quantities and tolerance, by the costs of tables/cost.csv.
 
 The plan depends on the scene only: the island model is the universal table where its certificate
 suffices, else the exact solver, and many gaps of other theories are evaluated by a contact law. A
@@ -9,27 +9,26 @@ A cost is a time divided by that of a fixed piece of work timed in the same run;
 the seconds of that work on the machine that measured. `python -m generate cost` measures.
 """
 
+from __future__ import annotations
+
 import csv
 import dataclasses
 import functools
 import math
 import pathlib
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.design.scenes.problem import (
-    REFINEMENTS,
-    Problem,
-    of_contact,
-    usual_effects,
-)
+from mbma_tables.contacts.question import both_separations
 from mbma_tables.islands.island_models import AnyModel
 from mbma_tables.tables.island4d import Island4dModel
 from mbma_tables.tables.universal import UniversalModel
+
+if TYPE_CHECKING:
+    from mbma_tables.design.scenes.scene import Scene
 
 TABLES = ("universal", "island4d")  # island models that are tables
 ISLAND_SHARE = 0.5  # share of a step's tolerance; the rest is for its quadrature
@@ -42,6 +41,8 @@ AMPLIFICATION = {
     # p(r) at a point converges later than its integrals
     "profile": 10.0,
 }
+# parts of a contact that are measured, of quantities that are made of one
+PART_OF = {"energy": "energy", "flow_coefficient": "leakage"}
 MIN_ENERGY_RTOL = 2e-9  # of an integral to 1e-9
 MIN_LAW_GAPS = 150  # from which a law pays where costs were not measured
 MIN_LAW_RTOL = 1e-9
@@ -167,7 +168,7 @@ class Step:
     """One step of a plan."""
 
     name: str
-    why: str  # effects that need it
+    why: str  # quantities that need it
     what: str  # description of its evaluation
     island_model: str | AnyModel | None
     rtol: float | None  # relative tolerance of the totals, the law or the solver
@@ -189,7 +190,7 @@ class Plan:
     """Steps in the order in which they run."""
 
     steps: tuple[Step, ...]
-    left_out: tuple[str, ...]  # effects that were not requested
+    left_out: tuple[str, ...]  # what was not requested
     switched_off: tuple[str, ...]  # refinements of the model that are off
     rtol: float  # tolerance of the plan
     overhead: float  # seconds that every scene takes
@@ -250,15 +251,15 @@ def duration(seconds: float) -> str:
     return f"{seconds / 1e-6:.3g} us"
 
 
-def make_plan(problem: Problem) -> Plan:
+def make_plan(scene: Scene) -> Plan:
     """The steps that meet the tolerance, or the tightest of `LADDER` that fit the time budget."""
-    if problem.rtol is not None:
-        return _Planner(problem, problem.rtol).plan()
-    assert problem.seconds is not None
+    if scene.rtol is not None:
+        return _Planner(scene, scene.rtol).plan()
+    assert scene.seconds is not None
     least = math.nan
     for rtol in LADDER:
         try:
-            plan = _Planner(problem, rtol).plan()
+            plan = _Planner(scene, rtol).plan()
         except InputError:
             continue  # too tight for the energy
         if plan.error > rtol:
@@ -271,10 +272,10 @@ def make_plan(problem: Problem) -> Plan:
             raise InputError(
                 f"the cost of {source} is not known: give rtol instead of seconds"
             )
-        if plan.seconds <= problem.seconds:
+        if plan.seconds <= scene.seconds:
             return plan
         least = plan.seconds
-    budget = f"seconds = {problem.seconds:g}"
+    budget = f"seconds = {scene.seconds:g}"
     raise InputError(
         f"{budget} is too little: the cheapest plan takes about {least:.3g} s"
     )
@@ -299,19 +300,19 @@ def certified_error(island_model: str | AnyModel, rtol: float) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class _Planner:
-    """The plan of one problem at one tolerance."""
+    """The plan of one scene at one tolerance."""
 
-    problem: Problem
+    scene: Scene
     rtol: float
     costs: Costs = dataclasses.field(default_factory=shipped_costs)
 
     @property
     def count(self) -> int:
-        question = self.problem.question
+        question = self.scene.question
         return 0 if question is None else int(question.value.size)
 
     def plan(self) -> Plan:
-        problem = self.problem
+        scene = self.scene
         steps = self.steps()
         shipped = {
             step.island_model for step in steps if isinstance(step.island_model, str)
@@ -319,50 +320,41 @@ class _Planner:
         imports = [self.costs.of(island_model, "import") for island_model in shipped]
         return Plan(
             steps=tuple(steps),
-            left_out=tuple(n for n in usual_effects() if n not in problem.outputs),
-            switched_off=tuple(name for name in REFINEMENTS if name in problem.dropped),
+            left_out=tuple(scene.not_requested),
+            switched_off=tuple(scene.without),
             rtol=self.rtol,
             overhead=self.costs.of("scene", "call"),
             first_use=max(imports, default=0.0),
-            theory=problem.theory_name,
+            theory=scene.theory_name,
         )
 
     def steps(self) -> list[Step]:
-        """Steps of all effects, in the order in which they run."""
-        problem = self.problem
-        outputs = problem.outputs
-        hertz = "area" in outputs and "subscale_area" in problem.dropped
-        why = of_contact(outputs)
-        if hertz:
-            why.remove("area")
-        if problem.question is not None and problem.is_inverted:
-            why.append(f"{problem.question.name}s prescribed")
+        """All steps, in the order in which they run."""
+        scene = self.scene
         steps = []
-        if why:
-            steps.append(self.contact(why))
-        if hertz:
+        if scene.of_contact or scene.is_inverted:
+            steps.append(self.contact())
+        if scene.is_hertz_area:
             what = "adaptive sum over islands with eta = 1, the Hertz area"
             steps.append(
                 self.summed("hertz area", "area without subscale_area", what, "island4d")
             )
-        if "island_statistics" in outputs:
-            islands = f"{problem.points} islands of the distribution (Eq. 42)"
+        if scene.points is not None:
+            islands = f"{scene.points} islands of the distribution (Eq. 42)"
             what = f"number of islands at {self.count} gaps, {islands}"
-            steps.append(
-                self.summed("island statistics", "island_statistics", what, "rigid")
-            )
-        if "pressure_profile" in outputs:
+            steps.append(self.summed("island statistics", "points", what, "rigid"))
+        if scene.deltas is not None:
             steps.append(self.profiles())
-        steps += [self.compared(name) for name in problem.theories]
+        steps += [self.compared(name) for name in scene.theories]
         return steps
 
     def profiles(self) -> Step:
         """Islands solved one by one."""
-        islands = int(np.size(self.problem.deltas))
+        islands = int(np.size(self.scene.deltas))
         rtol = ISLAND_SHARE * self.rtol / AMPLIFICATION["profile"]
         return Step(
             name="profiles",
-            why="pressure_profile",
+            why="deltas",
             what="the island problem solved with p(r) and d(r)",
             island_model="exact",
             rtol=rtol,
@@ -378,7 +370,7 @@ class _Planner:
             seconds = self.costs.of("persson", "gap")
         return Step(
             name=name,
-            why="comparison",
+            why="theories",
             what="another theory at the same gaps",
             island_model=None,
             rtol=None,
@@ -389,74 +381,75 @@ class _Planner:
 
     def island_model(self, tolerance: float) -> str | AnyModel:
         """The island model for a step with that tolerance."""
-        if self.problem.island_model is not None:
-            return self.problem.island_model
-        if "sphere_deformation" in self.problem.dropped:
+        if self.scene.island_model is not None:
+            given: str | AnyModel = self.scene.island_model
+            return given
+        if "sphere_deformation" in self.scene.without:
             return "rigid"
         share = ISLAND_SHARE * tolerance
         return "universal" if certified_error("universal", share) <= share else "exact"
 
-    def contact(self, why: Sequence[str]) -> Step:
-        """One contact at all gaps, by the scene's theory."""
-        outputs = self.problem.outputs
-        requirements = {
-            "inverse": self.problem.is_inverted,
-            "slopes": self.problem.needs_slopes,
-            "energy": self.problem.computes("energy"),
-            "yield": "yield" in outputs,
-            "leakage": "leakage" in outputs,
-        }
-        parts = frozenset(part for part, is_needed in requirements.items() if is_needed)
-        reasons = ", ".join(why)
-        if self.problem.sums_islands:
-            return self.contact_of_mbma(reasons, parts)
-        return self.contact_of_another(reasons, parts)
-
     @property
-    def evaluation(self) -> str:
-        """What is evaluated in one contact, for the text of a plan."""
-        return f"pressure, area and derived quantities at {self.count} gaps"
+    def parts(self) -> set[str]:
+        """What of a contact takes time or amplifies errors, by what its quantities are made of."""
+        scene = self.scene
+        parts = {part for name, part in PART_OF.items() if scene.computes(name)}
+        if scene.is_inverted:
+            parts.add("inverse")
+        if scene.needs_slopes:
+            parts.add("slopes")
+        if scene.yields:
+            parts.add("yield")
+        return parts
 
-    def contact_of_mbma(self, why: str, parts: frozenset[str]) -> Step:
-        """One contact at all gaps, by sums over islands."""
-        if "energy" in parts and self.rtol < MIN_ENERGY_RTOL:
-            best = f"{MIN_ENERGY_RTOL:.0e} at best"
-            raise InputError(f"rtol = {self.rtol:g} is too tight for energy: {best}")
-        factor = math.prod(by for part, by in AMPLIFICATION.items() if part in parts)
-        what = f"sum over islands (Eqs. 48, 49): {self.evaluation}"
-        step = self.summed("contact", why, what, None, factor)
-        theory = self.problem.theory_name
-        seconds = step.seconds + self.besides(theory, parts)
-        return dataclasses.replace(step, seconds=seconds, theory=theory)
+    def contact(self) -> Step:
+        """One contact at all gaps, by the scene's theory, or by its law if that suffices and costs less."""
+        scene = self.scene
+        why = list(scene.of_contact)
+        why += ["hardness"] * scene.yields
+        if scene.is_inverted and scene.question is not None:
+            why.append(f"{scene.question.name} prescribed")
+        factor = math.prod(by for part, by in AMPLIFICATION.items() if part in self.parts)
+        what = f"pressure, area and derived quantities at {self.count} gaps"
+        if scene.sums_islands:
+            if scene.computes("energy") and self.rtol < MIN_ENERGY_RTOL:
+                best = f"{MIN_ENERGY_RTOL:.0e} at best"
+                raise InputError(f"rtol = {self.rtol:g} is too tight for energy: {best}")
+            what = f"sum over islands (Eqs. 48, 49): {what}"
+            step = self.summed("contact", ", ".join(why), what, None, factor)
+            seconds = step.seconds + self.besides()
+            return dataclasses.replace(step, seconds=seconds, theory=scene.theory_name)
+        return self.contact_or_law(", ".join(why), what, factor)
 
-    def besides(self, theory: str, parts: frozenset[str]) -> float:
+    def besides(self) -> float:
         """Seconds of what one contact computes besides pressures and areas at given gaps."""
+        parts = self.parts
         # with a hardness the gap at a pressure is found otherwise
         if {"inverse", "yield"} <= parts:
             parts = parts - {"inverse", "yield"} | {"yield inverse"}
-        if "slopes" in parts and not self.problem.sums_islands:
-            parts -= {"slopes"}  # other theories have them at once
+        if not self.scene.sums_islands:
+            parts.discard("slopes")  # other theories have them at once
+        theory = self.scene.theory_name
         return sum(
             self.costs.of(theory, f"{part} once")
             + self.count * self.costs.of(theory, f"{part} gap")
             for part in parts
         )
 
-    def contact_of_another(self, why: str, parts: frozenset[str]) -> Step:
+    def contact_or_law(self, why: str, what: str, factor: float) -> Step:
         """One contact by a theory other than MBMA, or its law if that suffices and costs less."""
-        theory = self.problem.theory_name
-        factor = math.prod(by for part, by in AMPLIFICATION.items() if part in parts)
+        scene = self.scene
+        theory = scene.theory_name
         error = self.theory_error()
-        if "yield" in parts:
+        if scene.yields:
             error = factor * error
-        at_gaps = self.costs.of(theory, "call") + self.count * self.costs.of(
-            theory, "gap"
-        )
-        seconds = at_gaps + self.besides(theory, parts)
+        at_gaps = self.costs.of(theory, "call")
+        at_gaps += self.count * self.costs.of(theory, "gap")
+        seconds = at_gaps + self.besides()
         step = Step(
             name="contact",
             why=why,
-            what=self.evaluation,
+            what=what,
             island_model=None,
             rtol=None,
             count=self.count,
@@ -465,13 +458,13 @@ class _Planner:
             theory=theory,
         )
         # a law has force and area only
-        if not {*of_contact(self.problem.outputs)} <= {"pressure", "area"}:
+        if scene.yields or not {*scene.of_contact} <= {"pressure", "area"}:
             return step
         rtol = max(
             (1 - ISLAND_SHARE) * self.rtol / AMPLIFICATION["inverse"], MIN_LAW_RTOL
         )
         lookup = self.costs.of("law", "lookup")
-        if "inverse" in parts:
+        if scene.is_inverted:
             lookup += self.costs.of("law", "invert")
         by_law = self.costs.of(theory, "law", rtol) + self.count * lookup
         law_pays = by_law < seconds
@@ -480,11 +473,7 @@ class _Planner:
         if not law_pays:
             return step
         return dataclasses.replace(
-            step,
-            name="law",
-            rtol=rtol,
-            error=factor * (rtol + error),
-            seconds=by_law,
+            step, name="law", rtol=rtol, error=factor * (rtol + error), seconds=by_law
         )
 
     def summed(
@@ -515,18 +504,17 @@ class _Planner:
         """Bound of the scene's theory on its numerical error."""
         from mbma_tables.theories import resolve
 
-        surface = self.problem.surface
-        question = self.problem.question
+        surface = self.scene.surface
+        question = self.scene.question
         h_max = float(surface.h_max)
         farthest = 0.0
         # the farther from the mid-plane, the larger
-        if question is not None and question.name == "mean_separation":
-            farthest = np.max(question.value)
-        elif question is not None and question.is_gap:
-            farthest = np.max((h_max + question.value) / 2)
-        u = min(max(farthest, 0.5 * h_max), LAST * h_max)
-        theory = resolve(self.problem.theory, surface)
-        return float(theory.answer(surface, np.asarray(u)).error)
+        if question is not None and question.is_gap:
+            _, u = both_separations(question.name, question.value, h_max, False)
+            farthest = float(np.max(u))
+        within = min(max(farthest, 0.5 * h_max), LAST * h_max)
+        theory = resolve(self.scene.theory, surface)
+        return float(theory.answer(surface, np.asarray(within)).error)
 
 
 def _name(island_model: Any) -> str:

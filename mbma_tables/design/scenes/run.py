@@ -8,13 +8,12 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.bodies.bodies import Bodies
 from mbma_tables.bodies.materials import ELASTIC_PSI
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
@@ -23,9 +22,8 @@ from mbma_tables.common.progress import doing
 from mbma_tables.contacts.quantities.declaration import of_yielding_contacts
 from mbma_tables.contacts.quantities.registry import registry, unit_of
 from mbma_tables.design.scenes.plan import AMPLIFICATION, TABLES, Plan, Step
-from mbma_tables.design.scenes.problem import Problem
+from mbma_tables.design.scenes.scene import LEAKAGE, Scene
 from mbma_tables.islands.island_models import RigidModel, answer_islands
-from mbma_tables.islands.variants import get_variant
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import Surface
@@ -40,77 +38,120 @@ if TYPE_CHECKING:
     from mbma_tables.theories.mbma.profile import Shape
 
 
+# names of prescribed quantities in results, beside what is computed
+GIVEN = {"pressure": "nominal_pressure", "area": "prescribed_area"}
+# what scenes have besides the quantities of contacts: one with the same unit, and the meaning
+OF_SCENES = {
+    "nominal_pressure": ("pressure", "F/A0 as prescribed"),
+    "prescribed_area": ("area", "A/A0 as prescribed"),
+    "island_number": ("D", "islands in contact per nominal area (Eq. 42)"),
+    "island_delta": ("delta", "approach of an island"),
+    "island_force": ("island_force", "load of an island at that approach"),
+    "island_area": ("island_area", "contact area of an island at that approach"),
+    "island_density": ("island_density", "islands per nominal area and approach"),
+    "profile_delta": ("delta", "approach of the island"),
+    "profile_radius": ("R_d", "radius r in the island"),
+    "profile_pressure": ("pressure", "pressure p(r) (Eq. 36)"),
+    "profile_gap": (
+        "separation",
+        "d(r), deformed sphere to mid-plane of the summits (Eq. 34)",
+    ),
+    "hertz_area": ("area", "Hertz area of the summits over A0 (eta = 1)"),
+}
+# the gaps, the prescribed quantity, and what islands are ordered by
+COORDINATES = (
+    "separation",
+    "mean_separation",
+    *GIVEN.values(),
+    "profile_delta",
+    "island_delta",
+)
+
+
 @dataclasses.dataclass
 class Run:
     """A plan in execution: values passed between steps, and results."""
 
-    problem: Problem
+    scene: Scene
     surface: AnySurface
     gap: Any = None  # separations d
-    # dimensions and values by name
-    quantities: dict[str, tuple[tuple[str, ...], ArrayLike]] = dataclasses.field(
-        default_factory=dict,
+    # dimensions, values, unit and meaning by name
+    quantities: dict[str, tuple[tuple[str, ...], ArrayLike, str, str]] = (
+        dataclasses.field(default_factory=dict)
     )
     errors: dict[str, float] = dataclasses.field(
         default_factory=dict
     )  # bounds that steps reached
     reasons: dict[str, list[int]] | None = None
 
-    def keep(self, values: Mapping[str, ArrayLike], *dims: str) -> None:
-        """Record values over dimensions, gaps by default."""
-        dimensions = dims or ("gap",)
-        for name, array in values.items():
-            self.quantities[name] = (dimensions, array)
+    def keep(
+        self,
+        name: str,
+        values: ArrayLike,
+        *dims: str,
+        unit: str | None = None,
+        meaning: str | None = None,
+        same: str = "",
+    ) -> None:
+        """Record values over dimensions, gaps by default.
 
-
-# names of prescribed quantities in results, beside what is computed
-GIVEN = {"pressure": "nominal_pressure", "area": "prescribed_area"}
+        Unit and meaning are those of the declaration, or of `OF_SCENES`; `same` is a name
+        whose unit and meaning they are.
+        """
+        of_scene = OF_SCENES.get(same or name)
+        like = of_scene[0] if of_scene else same or name
+        if unit is None:
+            unit = unit_of(like, self.scene.in_units.units)
+        if meaning is None:
+            meaning = of_scene[1] if of_scene else registry()[like].meaning
+        self.quantities[name] = (dims or ("gap",), values, unit, meaning)
 
 
 def _contact(run: Run, step: Step) -> None:
     """One contact at all gaps, and of it the requested quantities."""
-    from mbma_tables.contacts.contact import contact
+    from mbma_tables.contacts.contact import contact_of
 
-    problem = run.problem
-    theory = problem.theory
-    if problem.sums_islands:
+    scene = run.scene
+    theory = scene.theory
+    if scene.sums_islands:
         options = {
             "island_model": step.island_model,
-            "variant": problem.variant,
+            "variant": scene.variant,
             "rtol": step.rtol,
             "outside": _outside(step),
         }
         theory = resolve(theory, options=options)
-    assert problem.question is not None
+    assert scene.question is not None
+    given = {scene.question.name: scene.question.value}
     # without its end the surface is a higher one, whose mean gaps are others than the scene's
-    if "finite_height" in problem.dropped:
-        arguments = {"separation": run.gap}
-    else:
-        arguments = {problem.question.name: problem.question.value}
-    bodies = Bodies(
-        problem.E_star, hardness=problem.hardness, conductivity=problem.conductivities
-    )
-    pressed = contact(run.surface, bodies, theory=theory, **arguments)
+    if "finite_height" in scene.without:
+        given = {"separation": run.gap}
+    pressed = contact_of(run.surface, scene.in_units, given, theory)
     if run.gap is None:
         run.gap = pressed.separation
     _keep_quantities(run, pressed)
     error = float(pressed.error.max())
-    if problem.sums_islands and problem.hardness is None:
+    if scene.sums_islands and not scene.yields:
         error *= _amplification(run, theory)
     run.errors[step.name] = error
 
 
 def _keep_quantities(run: Run, pressed: Contact) -> None:
     """Record the requested quantities of a contact."""
-    problem = run.problem
-    requested = problem.outputs
-    names = [name for name in registry() if name in requested]
-    # the Hertz area has a step of its own
-    if "area" in names and "subscale_area" in problem.dropped:
-        names.remove("area")
-    if "validity" in requested:
-        names += _validity(pressed)
-    if "yield" in requested:
+    names = [name for name in run.scene.of_contact if name in registry()]
+    if "valid" in names:
+        # with the model uncertainty of every quantity that such contacts show
+        uncertainties = {declared.uncertainty for declared in registry().values()}
+        names += [
+            name
+            for name, declared in registry().items()
+            if name in uncertainties and declared.is_shown(pressed)
+        ]
+        # places of the entries that each reason concerns
+        run.reasons = {}
+        for reason, is_concerned in pressed.reasons.items():
+            run.reasons[reason] = np.flatnonzero(is_concerned).tolist()
+    if run.scene.yields:
         # how near the pressure of the spots is to the hardness, and what elastic contacts lack
         names.append("mean_pressure")
         names += [
@@ -120,29 +161,16 @@ def _keep_quantities(run: Run, pressed: Contact) -> None:
         ]
     # some are one number for all gaps
     shape = np.shape(pressed.mean_separation)
-    run.keep({name: np.broadcast_to(pressed.quantity(name), shape) for name in names})
-    if "leakage" in requested:
-        leakage = pressed.leakage
-        run.keep(
-            {
-                "leakage": leakage.K,
-                "leakage_valid": leakage.valid,
-                "leakage_scatter": leakage.scatter,
-                "leakage_blocked": leakage.blocked,
-            }
-        )
-    if "validity" in requested:
-        # places of the entries that each reason concerns
-        run.reasons = {}
-        for reason, is_concerned in pressed.reasons.items():
-            run.reasons[reason] = np.flatnonzero(is_concerned).tolist()
-
-
-def _validity(pressed: Contact) -> list[str]:
-    """Whether contacts are valid, and the model uncertainty of every quantity that they show."""
-    uncertainties = {declared.uncertainty for declared in registry().values()}
-    shown = [name for name in registry() if name in uncertainties]
-    return ["valid", *(n for n in shown if registry()[n].is_shown(pressed))]
+    for name in names:
+        values = np.broadcast_to(pressed.quantity(name), shape)
+        run.keep(name, values, unit=registry()[name].unit(pressed))
+    if LEAKAGE in run.scene.quantities:
+        for key, variable in pressed.leakage.to_dataset().data_vars.items():
+            field = LEAKAGE if key == "K" else f"{LEAKAGE}_{key}"
+            facts = variable.attrs
+            run.keep(
+                field, variable.values, unit=facts["units"], meaning=facts["long_name"]
+            )
 
 
 def _outside(step: Step) -> str:
@@ -152,11 +180,11 @@ def _outside(step: Step) -> str:
 
 def _amplification(run: Run, theory: Any) -> float:
     """Largest ratio of the errors of the requested quantities to that of force and area."""
-    problem = run.problem
+    scene = run.scene
     h_max = float(run.surface.h_max)
     gap = run.gap[run.gap < h_max]
-    is_inverted = problem.is_inverted
-    needs_slopes = problem.needs_slopes
+    is_inverted = scene.is_inverted
+    needs_slopes = scene.needs_slopes
     if not gap.size or not (needs_slopes or is_inverted):
         return 1.0
     totals = theory.totals(run.surface, gap, slopes=True)
@@ -166,7 +194,7 @@ def _amplification(run: Run, theory: Any) -> float:
     if is_inverted:
         # pressures at prescribed areas: less accurate where the area hardly rises
         by_area = log_slope * totals.area / np.abs(totals.area_slope)
-        at_areas = problem.areas is not None
+        at_areas = scene.area is not None
         factor += max(1.0, float(by_area.max())) if at_areas else 1.0
     if not needs_slopes:
         return factor
@@ -179,17 +207,16 @@ def _law(run: Run, step: Step) -> None:
     """Pressure and area of a theory other than MBMA by its law."""
     from mbma_tables.contacts.law.make import contact_law
 
-    problem = run.problem
+    scene = run.scene
     assert step.rtol is not None
-    assert problem.question is not None
-    law = contact_law(run.surface, problem.E_star, theory=problem.theory, rtol=step.rtol)
+    assert scene.question is not None
+    law = contact_law(run.surface, scene.bodies, theory=scene.theory, rtol=step.rtol)
     amplification = 1.0
-    if problem.is_inverted:
-        run.gap = law.separations_of(problem.question)
+    if scene.is_inverted:
+        run.gap = law.separations_of(scene.question)
         amplification = AMPLIFICATION["inverse"]
-    for name in problem.outputs & {"pressure", "area"}:
-        at_gap = getattr(law, name)
-        run.keep({name: at_gap(separation=run.gap)})
+    for name in scene.of_contact:
+        run.keep(name, getattr(law, name)(separation=run.gap))
     run.errors[step.name] = amplification * law.error
 
 
@@ -211,7 +238,7 @@ def hertz_area(run: Run, step: Step) -> None:
     assert step.island_model is not None
     assert step.rtol is not None
     surface = run.surface
-    variant = get_variant(run.problem.variant)
+    variant = run.scene.variant
     island_model = get_model(step.island_model, step.rtol, variant)
     depth = (float(surface.h_max) - run.gap) / float(surface.h_rms)
     along_depth = profile(
@@ -225,7 +252,7 @@ def hertz_area(run: Run, step: Step) -> None:
     is_touching = depth > 0
     area = np.zeros(depth.shape)
     area[is_touching] = along_depth.totals(depth[is_touching])[3]
-    run.keep({"area": area})
+    run.keep("area", area, meaning=OF_SCENES["hertz_area"][1])
     run.errors[step.name] = along_depth.error
 
 
@@ -236,16 +263,17 @@ def island_statistics(run: Run, step: Step) -> None:
 
     assert step.island_model is not None
     assert step.rtol is not None
-    problem = run.problem
+    scene = run.scene
+    assert scene.points is not None
     surface = run.surface
     shape = _shape(surface)
-    variant = get_variant(problem.variant)
+    variant = scene.variant
     h_rms = float(surface.h_rms)
     depth = np.asarray(surface.h_max - run.gap) / h_rms
     source = source_of(shape, variant)
     deepest = max(float(depth.max()), 0.0)
     # approaches up to the deepest, graded towards first contact
-    fraction = np.linspace(0, 1, problem.points + 1)[1:]
+    fraction = np.linspace(0, 1, scene.points + 1)[1:]
     stretched = fraction * np.arcsinh(np.sqrt(deepest / source.layer))
     delta = source.layer * np.sinh(stretched) ** 2
     # where no gap touches there is no distribution
@@ -261,9 +289,9 @@ def island_statistics(run: Run, step: Step) -> None:
         groups, s, q0 = islands_of(surface, delta * h_rms, variant)
         island_model = get_model(step.island_model, step.rtol, variant)
         phi = answer_islands(island_model, groups, _outside(step))
-        pressure = problem.E_star * s / q0 * scale_force(groups) * phi.phi_F
+        pressure = scene.E_star * s / q0 * scale_force(groups) * phi.phi_F
         # without the area of smaller scales, all of the summit's area is in contact: eta = 1
-        eta = groups["eta"] if "subscale_area" in problem.dropped else 1.0
+        eta = groups["eta"] if "subscale_area" in scene.without else 1.0
         area = scale_area(groups) * phi.phi_A / eta / q0**2
         shift, rate = source.heights(groups, delta)
         spread = source.density(groups, delta, shift - rate * depth[:, None])
@@ -271,12 +299,11 @@ def island_statistics(run: Run, step: Step) -> None:
         # no island approaches further than the highest one
         density = np.where(delta <= depth[:, None], spread, 0.0) * q0**2 / s
         error = max(counted.error, float(np.max(phi.error)))
-    run.keep({"island_number": number})
-    run.keep(
-        {"island_delta": delta * h_rms, "island_force": pressure, "island_area": area},
-        "approach",
-    )
-    run.keep({"island_density": density}, "gap", "approach")
+    run.keep("island_number", number)
+    run.keep("island_delta", delta * h_rms, "approach")
+    run.keep("island_force", pressure, "approach")
+    run.keep("island_area", area, "approach")
+    run.keep("island_density", density, "gap", "approach")
     run.errors[step.name] = error
 
 
@@ -286,23 +313,18 @@ def profiles(run: Run, step: Step) -> None:
     from mbma_tables.theories.mbma.island import islands_of
 
     assert step.rtol is not None
-    problem = run.problem
-    delta = np.atleast_1d(np.asarray(problem.deltas, dtype=float)).ravel()
-    groups, s, q0 = islands_of(run.surface, delta, get_variant(problem.variant))
+    scene = run.scene
+    delta = np.ravel(scene.deltas)
+    groups, s, q0 = islands_of(run.surface, delta, scene.variant)
     sigma = groups["sigma"]
     solved = greenwood_tripp.solve(groups["X"], groups["mu"], rtol=step.rtol)
     radius = np.sqrt(2 * groups["R_d"] * sigma)
-    run.keep({"profile_delta": delta}, "island")
-    pressure = problem.E_star * q0 * s * (sigma / radius)[:, None] * solved.pressure
-    run.keep(
-        {
-            "profile_radius": solved.rho * radius[:, None] / q0,
-            "profile_pressure": pressure,
-            "profile_gap": solved.gap * sigma[:, None] * s,
-        },
-        "island",
-        "node",
-    )
+    run.keep("profile_delta", delta, "island")
+    pressure = scene.E_star * q0 * s * (sigma / radius)[:, None] * solved.pressure
+    nodes = ("island", "node")
+    run.keep("profile_radius", solved.rho * radius[:, None] / q0, *nodes)
+    run.keep("profile_pressure", pressure, *nodes)
+    run.keep("profile_gap", solved.gap * sigma[:, None] * s, *nodes)
     run.errors[step.name] = float(np.max(solved.error))
 
 
@@ -334,30 +356,33 @@ def other_theory(
 
 def comparison(run: Run, step: Step) -> None:
     """Another theory beside the scene's own."""
-    problem = run.problem
-    cap = math.inf if problem.hardness is None else problem.hardness
-    other = other_theory(step.name, problem.surface, run.gap, problem.E_star, cap)
-    run.keep({f"{step.name}_pressure": other.pressure, f"{step.name}_area": other.area})
+    scene = run.scene
+    cap = float(scene.in_units.hardness)
+    other = other_theory(step.name, scene.surface, run.gap, scene.E_star, cap)
+    for name, values in (("pressure", other.pressure), ("area", other.area)):
+        letter = "F" if name == "pressure" else "A"
+        meaning = f"{letter}/A0 by {step.name}"
+        run.keep(f"{step.name}_{name}", values, meaning=meaning, same=name)
 
 
-def run_plan(problem: Problem, plan: Plan) -> xr.Dataset:
-    """The quantities of a problem with units and provenance.
+def run_plan(scene: Scene, plan: Plan) -> xr.Dataset:
+    """The quantities of a scene with units and provenance.
 
     Raises
     ------
     ConvergenceError
         If their error exceeds the tolerance.
     """
-    run = Run(problem, problem.surface)
-    h_max = float(problem.surface.h_max)
-    question = problem.question
+    run = Run(scene, scene.surface)
+    h_max = float(scene.surface.h_max)
+    question = scene.question
     if question is not None and question.is_gap:
         is_separation = question.name == "separation"
         run.gap = question.value if is_separation else 2 * question.value - h_max
-        if "finite_height" in problem.dropped:
-            run.surface = _without_end(problem.surface, run.gap, plan.rtol)
+        if "finite_height" in scene.without:
+            run.surface = _without_end(scene.surface, run.gap, plan.rtol)
     elif question is not None:
-        run.keep({GIVEN[question.name]: question.value})
+        run.keep(GIVEN[question.name], question.value)
     # steps of a plan by name; any other name is that of a theory to compare with
     evaluated_by: dict[str, Callable[[Run, Step], None]] = {
         "contact": _contact,
@@ -375,7 +400,8 @@ def run_plan(problem: Problem, plan: Plan) -> xr.Dataset:
         reached = f"the error bound reached is {error:.2e}, above rtol = {plan.rtol:.2e}"
         raise ConvergenceError(f"{reached}: give a larger rtol")
     if run.gap is not None:
-        run.keep({"separation": run.gap, "mean_separation": (h_max + run.gap) / 2})
+        run.keep("separation", run.gap)
+        run.keep("mean_separation", (h_max + run.gap) / 2)
     return to_dataset(run, plan)
 
 
@@ -390,76 +416,12 @@ def _without_end(surface: Any, gap: FloatArray, rtol: float) -> AnySurface:
     return higher
 
 
-# the quantity with the same unit, and the description, of what scenes have besides contacts
-OF_SCENES = {
-    "nominal_pressure": ("pressure", "F/A0 as prescribed"),
-    "prescribed_area": ("area", "A/A0 as prescribed"),
-    "leakage": (
-        "flow_coefficient",
-        "flow coefficient k h_rms^3: flow per length of seal is it dp/(12 viscosity width)",
-    ),
-    "leakage_valid": ("valid", "whether flow through such contacts was simulated"),
-    "leakage_scatter": (
-        "leakage_scatter",
-        "standard deviation of ln of the flow coefficient between simulations",
-    ),
-    "leakage_blocked": ("valid", "whether contact percolates"),
-    "island_number": ("D", "islands in contact per nominal area (Eq. 42)"),
-    "island_delta": ("delta", "approach of an island"),
-    "island_force": ("island_force", "load of an island at that approach"),
-    "island_area": ("island_area", "contact area of an island at that approach"),
-    "island_density": ("island_density", "islands per nominal area and approach"),
-    "profile_delta": ("delta", "approach of the island"),
-    "profile_radius": ("R_d", "radius r in the island"),
-    "profile_pressure": ("pressure", "pressure p(r) (Eq. 36)"),
-    "profile_gap": (
-        "separation",
-        "d(r), deformed sphere to mid-plane of the summits (Eq. 34)",
-    ),
-}
-
-
-def _units(problem: Problem) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of every quantity that a scene can hold."""
-    quantities = {}
-    for name, declared in registry().items():
-        quantities[name] = (name, declared.meaning)
-    quantities |= OF_SCENES
-    quantities["area"] = ("area", "real contact area A/A0")
-    if "subscale_area" in problem.dropped:
-        quantities["area"] = ("area", "Hertz area of the summits over A0 (eta = 1)")
-    for name in problem.theories:
-        quantities[f"{name}_pressure"] = ("pressure", f"F/A0 by {name}")
-        quantities[f"{name}_area"] = ("area", f"A/A0 by {name}")
-    units = {}
-    for name, (same_unit, meaning) in quantities.items():
-        units[name] = (unit_of(same_unit, problem.units), meaning)
-    units["solid_conductance"] = (
-        problem.conductance_unit,
-        "conductance per nominal area",
-    )
-    return units
-
-
-# the gaps, the prescribed quantity, and what islands are ordered by
-COORDINATES = (
-    "separation",
-    "mean_separation",
-    "nominal_pressure",
-    "prescribed_area",
-    "profile_delta",
-    "island_delta",
-)
-
-
 def to_dataset(run: Run, plan: Plan) -> xr.Dataset:
     """The computed quantities; coordinates are gaps and the prescribed quantity."""
     import xarray as xr
 
-    units = _units(run.problem)
     variables = {}
-    for name, (dims, values) in run.quantities.items():
-        unit, meaning = units[name]
+    for name, (dims, values, unit, meaning) in run.quantities.items():
         variables[name] = xr.Variable(dims, values, {"units": unit, "long_name": meaning})
     dataset = xr.Dataset(variables, attrs=_attributes(run, plan))
     return dataset.set_coords([name for name in COORDINATES if name in variables])
@@ -467,30 +429,30 @@ def to_dataset(run: Run, plan: Plan) -> xr.Dataset:
 
 def _attributes(run: Run, plan: Plan) -> dict[str, str | float]:
     """What the quantities were calculated from and how."""
-    problem = run.problem
-    surface = problem.surface
+    scene = run.scene
+    surface = scene.surface
     by_islands = [step for step in plan.steps if step.island_model is not None]
     island_models = {step.name: step.island_model_name for step in by_islands}
     attributes: dict[str, str | float] = {
-        "title": problem.title,
+        "title": scene.title,
         "plan": plan.text(),
         "rtol": plan.rtol,
         "error": max(run.errors.values(), default=0.0),
         "errors": json.dumps(run.errors),
-        "theory": problem.theory_name,
-        "variant": get_variant(problem.variant).name if problem.sums_islands else "",
+        "theory": scene.theory_name,
+        "variant": scene.variant.name if scene.sums_islands else "",
         "island_models": json.dumps(island_models),
-        "switched_off": " ".join(sorted(problem.dropped)),
-        "E_star": float(problem.E_star),
+        "switched_off": " ".join(sorted(scene.without)),
+        "E_star": float(scene.E_star),
         "table_hashes": json.dumps(_hashes(by_islands)),
     }
     # psi times the hardness
-    stress = float(problem.E_star * surface.rms_gradient)
-    if problem.hardness is None:
+    stress = float(scene.E_star * surface.rms_gradient)
+    if not scene.yields:
         attributes["elastic_hardness"] = stress / ELASTIC_PSI
     else:
-        attributes["hardness"] = float(problem.hardness)
-        attributes["psi"] = stress / float(problem.hardness)
+        attributes["hardness"] = float(scene.in_units.hardness)
+        attributes["psi"] = stress / float(scene.in_units.hardness)
     if run.reasons is not None:
         attributes["reasons"] = json.dumps(run.reasons)
     for name in PARAMETERS:

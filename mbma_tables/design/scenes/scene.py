@@ -1,69 +1,110 @@
-"""A scene: surface, gaps or loads, requested effects, and tolerance or time budget."""
+"""A scene: surface, bodies, gaps or loads, requested quantities, and tolerance or time budget.
+
+`plan` and `run` solve it.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import os
 import pathlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from mbma_tables.bodies.bodies import Bodies, BodiesInUnits
+from mbma_tables.common.arguments import (
+    number_in,
+    positive_array,
+    require,
+    require_name,
+    whole_number_in,
+)
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.toml_files import check, read_toml
+from mbma_tables.common.units import require_surface
+from mbma_tables.contacts.quantities.registry import registry
+from mbma_tables.contacts.question import Question
+from mbma_tables.contacts.result import Contact, Setup
 from mbma_tables.design.scenes.plan import Plan, make_plan
-from mbma_tables.design.scenes.problem import Problem
-from mbma_tables.design.scenes.specimen import from_tables, refuse_joint, schema
+from mbma_tables.design.specimen import from_tables, refuse_joint, schema
 from mbma_tables.islands.island_models import beside
+from mbma_tables.islands.variants import Variant, get_variant
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.tables.island4d import Island4dModel
+from mbma_tables.tables.universal import UniversalModel
+from mbma_tables.theories import THEORIES, default_name, is_table, resolve
+from mbma_tables.theories.named import OF_MAPS, options_of
 
 if TYPE_CHECKING:
     import xarray
 
+LEAKAGE = "leakage"  # of `Contact.leakage`: several quantities under one name
+# the steps of arguments that ask by themselves, as plans list what is not requested
+BY_ARGUMENTS = {
+    "deltas": "pressure_profile",
+    "points": "island_statistics",
+    "theories": "comparison",
+}
+OF_SUMS = "island_model"  # option of theories that sum islands
+OF_FILES = (OF_SUMS, "variant")  # options of a theory that are entries of a file
+# part of the model, and on unless switched off
+REFINEMENTS = ("subscale_area", "sphere_deformation", "finite_height")
+MIN_RTOL = 1e-10
+MAX_RTOL = 0.1
+MAX_SECONDS = 1e6
+DEFAULT_RTOL = 1e-6  # of MBMA
+DEFAULT_RTOL_OF_OTHERS = 1e-4  # of theories without a certified table
+
+
+def is_made_of(name: str, part: str) -> bool:
+    """Whether a quantity is another one, or made of it by its declaration."""
+    if name == LEAKAGE:
+        name = "flow_coefficient"
+    parts = registry()[name].made_of
+    return name == part or any(is_made_of(each, part) for each in parts)
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Scene(Problem):
+class Scene:
     """Description of a simulation, checked on construction; it can be run repeatedly.
 
     Parameters
     ----------
     surface : Surface
         One surface, not a batch.
-    effects : sequence of str
-        Requested effects: names of quantities of a contact, and of
-        `mbma_tables.design.scenes.problem.OTHERS`.
-    without : sequence of str
-        Refinements of the model switched off: "subscale_area", "sphere_deformation",
-        "finite_height".
-    separations, mean_separations, pressures, areas : array_like, one of them
-        d [length], u [length], F/A0 in the unit of `E_star`, or A/A0; one number or a list.
-        Texts such as "0.8 um" are converted to the units of the surface and the modulus.
-    E_star : float or str
-        Effective modulus, as a number or as text with a unit ("100 GPa"); stresses are in
-        its unit, over E* if it is 1.
-    hardness : float or str, optional
-        Largest pressure that the softer body supports, in the unit of `E_star`, for
-        "yield": the theory's elastic result is corrected by
-        `mbma_tables.theories.yielding`, and conductance is that at constant contact area.
+    bodies : Bodies or float or str
+        As for `contact`, each constant one number. With a hardness the theory's elastic
+        result is corrected by `mbma_tables.theories.yielding`, and the result has what
+        yields besides the requested quantities.
+    quantities : sequence of str
+        Names of quantities of a contact, as `Contact.quantity` takes them. "valid" brings
+        the model uncertainties and the reasons, "leakage" stands for all of
+        `Contact.leakage`.
+    separation, mean_separation, pressure, area : array_like, one of them
+        d [length], u [length], F/A0 in the unit of the modulus, or A/A0; one number or a
+        list. Texts such as "0.8 um" are converted to the units of the surface and the
+        modulus. A scene of profiles alone has none of them.
+    theory : str or theory, optional
+        As for `contact`. Of `Mbma` the plan chooses the island model and the tolerance,
+        unless the object has others than its defaults.
     rtol : float, optional
         Requested relative error, in [1e-10, 0.1]; without `seconds` by default 1e-6, or
-        1e-4 for other theories.
+        1e-4 for other theories than MBMA.
     seconds : float, optional
         Time budget instead of `rtol`; the measured costs determine the accuracy that it allows.
-    variant : str or Variant
-        Variant of the paper's equations.
-    island_model : str, path or IslandModel, optional
-        Island model, as for `Mbma`; without it the plan chooses between "universal" and "exact".
-    theory : str or theory, optional
-        One of `mbma_tables.theories.THEORIES` or an object, as for `contact`. Refinements,
-        island model and variant are MBMA's.
-    conductivities : pair of float or str, optional
-        Of the two bodies, thermal or electrical, for "solid_conductance", as for `Contact.solid_conductance`.
+    without : sequence of str
+        Refinements of MBMA switched off: "subscale_area", "sphere_deformation",
+        "finite_height".
     deltas : array_like, optional
-        Approaches [length] of the islands of "pressure_profile".
+        Approaches [length] of islands, of which MBMA's pressure and gap are computed along
+        the radius.
+    points : int, optional
+        Of MBMA's islands, over their approach: their number, loads, areas and density.
     theories : sequence of str
-        For "comparison": names of other theories.
-    points : int
-        Points of the distribution of "island_statistics", over the approach.
-    title : str, optional
+        Names of other theories, whose pressure and area stand beside those of the scene's.
+    title : str
         For the result.
 
     Raises
@@ -74,7 +115,8 @@ class Scene(Problem):
     Examples
     --------
     >>> from mbma_tables import Scene, Surface
-    >>> scene = Scene(Surface.named("concrete"), effects=["pressure"], separations=[0.2, 0.5], rtol=1e-5)
+    >>> road = Surface.named("concrete")
+    >>> scene = Scene(road, quantities=["pressure"], separation=[0.2, 0.5], rtol=1e-5)
     >>> [step.name for step in scene.plan().steps]
     ['contact']
     >>> found = scene.run()
@@ -83,6 +125,295 @@ class Scene(Problem):
     >>> found.attrs["error"] <= 1e-5
     True
     """
+
+    surface: AnySurface
+    bodies: Any = 1.0
+    _: dataclasses.KW_ONLY
+    quantities: Any = None
+    separation: Any = None
+    mean_separation: Any = None
+    pressure: Any = None
+    area: Any = None
+    theory: Any = None
+    rtol: float | None = None
+    seconds: float | None = None
+    without: Sequence[str] = ()
+    deltas: Any = None
+    points: int | None = None
+    theories: Sequence[str] = ()
+    title: str = "scene"
+    #: the bodies' constants as numbers, in the units of the scene
+    in_units: BodiesInUnits = dataclasses.field(init=False)
+    #: the prescribed quantity; None if nothing needs one
+    question: Question | None = dataclasses.field(init=False)
+    #: options of MBMA that are not left to the plan
+    options: Mapping[str, Any] = dataclasses.field(init=False)
+
+    def __post_init__(self) -> None:
+        require_surface(self.surface)
+        if self.surface.labelled or self.surface.shape != ():
+            raise InputError(
+                "a scene has one surface, not a batch: make a scene for each"
+            )
+        in_units = Bodies.of(self.bodies).in_units(self.surface)
+        for name in ("E_star", "hardness"):
+            if np.ndim(getattr(in_units, name)):
+                raise InputError(
+                    f"a scene has one {name}, not several: make a scene for each"
+                )
+        in_units.require_one_conductivity()
+        deltas = self.deltas
+        if deltas is not None:
+            deltas = positive_array("deltas", in_units.units.number("deltas", deltas))
+        vars(self).update(in_units=in_units, deltas=deltas)
+        self._take_names()
+        vars(self).update(question=self._checked_question())
+        self._take_theory()
+        self._set_tolerance()
+        self._check_needs()
+        self._check_refinements()
+
+    def _take_names(self) -> None:
+        """Take what is requested, without deltas or other theories pressure and area."""
+        if self.quantities is None:
+            is_alone = self.deltas is not None and not self.candidates
+            vars(self).update(quantities=() if is_alone else ("pressure", "area"))
+        for name, choices in (
+            ("quantities", {**registry(), LEAKAGE: None}),
+            ("without", REFINEMENTS),
+            ("theories", THEORIES),
+        ):
+            names = getattr(self, name)
+            if isinstance(names, str) or not isinstance(names, Iterable):
+                raise InputError(f"{name} must be a list of names: write [{names!r}]")
+            kind = {"quantities": "quantity", "without": "refinement"}
+            for each in names:
+                require_name(kind.get(name, "theory"), each, choices)
+            vars(self)[name] = tuple(dict.fromkeys(names))
+        if self.points is not None:
+            whole_number_in("points", self.points, 2, 10_000)
+        if not (self.quantities or self.requested_by_arguments):
+            raise InputError(
+                "nothing is requested: give quantities, deltas, points or theories"
+            )
+
+    @property
+    def candidates(self) -> dict[str, Any]:
+        """What is given of the four quantities of which one is prescribed."""
+        names = ("separation", "mean_separation", "pressure", "area")
+        return {n: getattr(self, n) for n in names if getattr(self, n) is not None}
+
+    def _checked_question(self) -> Question | None:
+        """The prescribed quantity with its numbers, a row; None if nothing needs it."""
+        given = self.candidates
+        # profiles are those of islands at approaches
+        needs_none = not self.quantities and self.points is None and not self.theories
+        if needs_none and not given:
+            return None
+        if needs_none:
+            raise InputError(
+                f"{next(iter(given))} is not needed for profiles: leave it out, or give "
+                "quantities"
+            )
+        fields = ("separation", "mean_separation", "pressure", "area")
+        question = Question.of(
+            self.in_units.units, {name: getattr(self, name) for name in fields}
+        )
+        name, numbers = question.name, question.value
+        if np.ndim(numbers) > 1:
+            raise InputError(
+                f"{name} must be one number or a list, got shape {numbers.shape}"
+            )
+        least = 0.0
+        allowed = "at least 0"
+        if name == "separation":
+            least = -float(self.surface.h_max)
+            allowed = f"at least -h_max = {least:.6g}, where the model ends"
+        require(name, numbers, numbers >= least, allowed)
+        return Question(name, np.atleast_1d(numbers).astype(float))
+
+    def _take_theory(self) -> None:
+        """Take the theory, or the default one, and its options that are not left to the plan."""
+        theory = self.theory
+        changed: Mapping[str, Any] = {}
+        if theory is None:
+            given_name = None if self.question is None else self.question.name
+            options = [OF_SUMS] if self.of_sums else []
+            theory = default_name(self.surface, given_name, options)
+        elif isinstance(theory, str) and not is_table(theory):
+            require_name("theory", theory, (*THEORIES, *OF_MAPS))
+        else:
+            resolved = resolve(theory, self.surface)
+            theory = resolved if is_table(theory) else theory
+            if OF_SUMS in resolved.options:
+                changed = resolved.changed_options
+                theory = resolved.name
+        vars(self).update(theory=theory, options=changed)
+
+    def _set_tolerance(self) -> None:
+        """Set `rtol`: as given, by default, or None where a time budget is given."""
+        if "outside" in self.options:
+            raise InputError(
+                "outside: a scene solves the islands that no table covers: leave it out"
+            )
+        rtol: float | None = DEFAULT_RTOL if self.sums_islands else DEFAULT_RTOL_OF_OTHERS
+        given = {"rtol": self.rtol, "seconds": self.seconds}
+        given["rtol of the theory"] = self.options.get("rtol")
+        names = [name for name, value in given.items() if value is not None]
+        if len(names) > 1:
+            raise InputError(
+                f"{' and '.join(names)} are given: give the accuracy or the time budget, "
+                "one of them"
+            )
+        if self.seconds is not None:
+            number_in("seconds", self.seconds, 1e-9, MAX_SECONDS)
+            rtol = None
+            if self.island_model is not None and not self.is_measured:
+                raise InputError(
+                    "the cost of your own island model is not known: give rtol instead "
+                    "of seconds"
+                )
+        elif names:
+            rtol = number_in("rtol", given[names[0]], MIN_RTOL, MAX_RTOL)
+        vars(self).update(rtol=rtol)
+
+    def _check_needs(self) -> None:
+        """Check what quantities need by their declarations, and what theories have."""
+        for name in self.quantities:
+            if name != LEAKAGE:
+                registry()[name].require_given(self.state)
+        if self.theory_name in self.theories:
+            raise InputError(
+                f"the scene is by theory {self.theory_name!r} itself: leave it out of "
+                "theories"
+            )
+        of_sums = " and ".join(self.of_sums)
+        if of_sums and not self.sums_islands:
+            owner = default_name(self.surface, options=[OF_SUMS])
+            raise InputError(
+                f"{of_sums}: of theory {owner!r}, not of {self.theory_name!r}: leave out"
+            )
+        if of_sums and self.yields:
+            raise InputError(
+                f"{of_sums}: of elastic contacts, and the bodies have a hardness: leave one "
+                "of the two out"
+            )
+
+    def _check_refinements(self) -> None:
+        """Check what cannot be computed without a refinement."""
+        if "sphere_deformation" in self.without and self.island_model is not None:
+            raise InputError(
+                "sphere_deformation is off, which is the rigid sphere: leave island_model out"
+            )
+        if "sphere_deformation" in self.without and self.deltas is not None:
+            raise InputError(
+                "deltas are of profiles of the deformed sphere: leave sphere_deformation on"
+            )
+        if "finite_height" not in self.without:
+            return
+        others = [n for n in self.quantities if n not in ("pressure", "area")]
+        if self.question is not None and not self.question.is_gap:
+            others.append(f"a given {self.question.name}")
+        if others:
+            raise InputError(
+                f"{others[0]} needs a surface that ends at h_max: leave finite_height on, "
+                "or ask for pressure and area at a separation"
+            )
+
+    @property
+    def state(self) -> Contact:
+        """A contact of the scene that was not computed, by which needs are checked."""
+        return Contact(Setup(self.surface, self.in_units, self.theory), {})
+
+    @property
+    def E_star(self) -> float:
+        """The effective modulus, in the unit of stresses."""
+        return float(self.in_units.E_star)
+
+    @property
+    def yields(self) -> bool:
+        """Whether the bodies have a hardness that is not infinite."""
+        return self.in_units.yields
+
+    @property
+    def island_model(self) -> Any:
+        """The island model that the theory was given; None where the plan chooses."""
+        return self.options.get(OF_SUMS)
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether the cost of the given island model is known."""
+        return isinstance(self.island_model, str | UniversalModel | Island4dModel)
+
+    @property
+    def variant(self) -> Variant:
+        """The variant of the paper's equations."""
+        return get_variant(self.options.get("variant", "reported"))
+
+    @property
+    def sums_islands(self) -> bool:
+        """Whether the theory sums islands, whose model and refinements a plan chooses."""
+        return isinstance(self.theory, str) and OF_SUMS in options_of(self.theory)
+
+    @property
+    def theory_name(self) -> str:
+        """Name of the theory in results."""
+        return self.theory if isinstance(self.theory, str) else self.theory.name
+
+    @property
+    def is_inverted(self) -> bool:
+        """Whether gaps follow from prescribed pressures or areas."""
+        return self.question is not None and not self.question.is_gap
+
+    @property
+    def of_sums(self) -> list[str]:
+        """Given arguments that only theories which sum islands have."""
+        given = {"deltas": self.deltas is not None, "points": self.points is not None}
+        given["without"] = bool(self.without)
+        return [name for name, is_given in given.items() if is_given]
+
+    @property
+    def requested_by_arguments(self) -> list[str]:
+        """Steps that an argument requests, beside the quantities of contacts."""
+        given = {"deltas": self.deltas is not None, "points": self.points is not None}
+        given["theories"] = bool(self.theories)
+        return [step for name, step in BY_ARGUMENTS.items() if given[name]]
+
+    @property
+    def is_hertz_area(self) -> bool:
+        """Whether the area is that of the summits, which has a step of its own."""
+        return "area" in self.quantities and "subscale_area" in self.without
+
+    @property
+    def of_contact(self) -> tuple[str, ...]:
+        """Requested quantities that are read from one contact."""
+        if not self.is_hertz_area:
+            return tuple(self.quantities)
+        return tuple(name for name in self.quantities if name != "area")
+
+    @property
+    def not_requested(self) -> list[str]:
+        """What such a contact shows with a model uncertainty, and other steps, that are not requested."""
+        state = self.state
+        # gaps are there without being asked for
+        requested = {*self.quantities, *self.requested_by_arguments, "mean_separation"}
+        shown = [
+            name
+            for name, declared in registry().items()
+            if declared.uncertainty is not None and declared.is_shown(state)
+        ]
+        others = [LEAKAGE, "valid", *BY_ARGUMENTS.values()]
+        return [name for name in (*shown, *others) if name not in requested]
+
+    def computes(self, part: str) -> bool:
+        """Whether a quantity is requested, or one that is made of it."""
+        return any(is_made_of(name, part) for name in self.quantities)
+
+    @property
+    def needs_slopes(self) -> bool:
+        """Whether derivatives are computed: of all quantities but some, as far as is known here."""
+        others = {*self.quantities} - {"pressure", "area", "energy", "valid", LEAKAGE}
+        return bool(others)
 
     @classmethod
     def from_toml(cls, path: os.PathLike[str] | str) -> Scene:
@@ -108,45 +439,19 @@ class Scene(Problem):
         folder: pathlib.Path = pathlib.Path(),
         title: str = "scene",
     ) -> Scene:
-        """The scene of the content of a TOML file; paths in it are relative to `folder`, the current one by default."""
+        """The scene of the content of a TOML file; paths in it are relative to `folder`, the current one by default.
+
+        Entries are the arguments of `Scene`, and options of the theory.
+        """
         check(content, schema())
-        specimen = from_tables(content, folder, title)
-        if (
-            content.get("island_statistics")
-            and "island_statistics" not in content["effects"]["on"]
-        ):
-            raise InputError(
-                "[island_statistics] is given and the effect is off: add it to on, or leave the table out"
-            )
-        found: dict[str, Any] = {
-            "surface": specimen.surface,
-            "effects": content["effects"]["on"],
-            "without": content["effects"].get("off", ()),
-            "E_star": specimen.modulus,
-            "title": title,
-        }
-        found |= {
-            name: content[name]
-            for name in ("title", "theory", "variant", "island_model")
-            if name in content
-        }
-        if "island_model" in found:
-            found["island_model"] = beside(found["island_model"], folder)
-        for name in (
-            "prescribed",
-            "pressure_profile",
-            "accuracy",
-            "island_statistics",
-            "comparison",
-            "yield",
-        ):
-            found |= content.get(name, {})
-        if "solid_conductance" in content:
-            found["conductivities"] = (
-                content["solid_conductance"]["k1"],
-                content["solid_conductance"]["k2"],
-            )
-        return cls(**found)
+        given = {"title": title} | dict(content)
+        specimen = from_tables({"surface": given.pop("surface")}, folder, title)
+        options = {name: given.pop(name) for name in OF_FILES if name in given}
+        if OF_SUMS in options:
+            options[OF_SUMS] = beside(options[OF_SUMS], folder)
+        if options:
+            given["theory"] = resolve(given.get("theory", "mbma"), options=options)
+        return cls(specimen.surface, **given)
 
     def plan(self) -> Plan:
         """The planned steps with island models, tolerances, certified errors and measured costs."""
@@ -157,7 +462,7 @@ class Scene(Problem):
         return self.plan().text()
 
     def run(self) -> xarray.Dataset:
-        """Compute the requested effects.
+        """Compute the requested quantities.
 
         Returns
         -------

@@ -381,28 +381,35 @@ def test_commands_show_a_declared_quantity_and_any_that_is_asked_for(
 
 
 def test_a_scene_computes_a_declared_quantity(thermal_time, tmp_path):
-    """Effects of scenes were a list, and conductivities were refused without the effect solid_conductance."""
+    """Quantities of scenes were a list of their own."""
     given = {
         "surface": FACE,
-        "effects": ["thermal_time", "energy_depth", "mean_pressure", "elastic_hardness"],
-        "pressures": ["10 MPa", "50 MPa"],
-        "E_star": "57.5 GPa",
+        "quantities": [
+            "thermal_time",
+            "energy_depth",
+            "mean_pressure",
+            "elastic_hardness",
+        ],
+        "pressure": ["10 MPa", "50 MPa"],
         "theory": "calibrated",
     }
     metals = ("45 W/(m K)", "167 W/(m K)")
-    found = Scene(**given, conductivities=metals).run()
     bodies = Bodies("57.5 GPa", conductivity=metals)
-    own = contact(FACE, bodies, pressure=given["pressures"], theory="calibrated")
-    for name in given["effects"]:
+    found = Scene(**given, bodies=bodies).run()
+    own = contact(FACE, bodies, pressure=given["pressure"], theory="calibrated")
+    for name in given["quantities"]:
         np.testing.assert_allclose(found[name], own.quantity(name), rtol=1e-12)
         assert found[name].attrs["units"] == own.units[name]
     assert "solid_conductance" not in found
-    with pytest.raises(InputError, match="'thermal_time' needs conductivities"):
-        Scene(**given)
+    with pytest.raises(InputError, match="thermal_time needs conductivity"):
+        Scene(**given, bodies="57.5 GPa")
     file = tmp_path / "scene.toml"
     file.write_text(
         """
         theory = "calibrated"
+        bodies = "57.5 GPa"
+        pressure = ["10 MPa", "50 MPa"]
+        quantities = ["energy_depth"]
         [surface]
         hurst = 0.8
         q0 = 0.06
@@ -410,18 +417,12 @@ def test_a_scene_computes_a_declared_quantity(thermal_time, tmp_path):
         h_rms = 1.0
         h_max = 3.5
         length_unit = "um"
-        [material]
-        E_star = "57.5 GPa"
-        [prescribed]
-        pressures = ["10 MPa", "50 MPa"]
-        [effects]
-        on = ["energy_depth"]
         """
     )
     of_file = Scene.from_toml(file).run()
     np.testing.assert_allclose(of_file["energy_depth"], own.energy_depth, rtol=1e-12)
     with pytest.raises(InputError, match="did you mean 'energy_depth'"):
-        Scene(**given | {"effects": ["energy_dept"]})
+        Scene(**given | {"quantities": ["energy_dept"]})
 
 
 def test_a_declared_quantity_has_sensitivities(thermal_time):

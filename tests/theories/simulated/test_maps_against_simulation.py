@@ -118,7 +118,7 @@ class TestDefaultTheory:
         surface = self.surface()
         found = contact(surface, pressure=[0.0, 1e-6, 0.01, 0.03, 0.2])
         assert found.theory == contact_law(surface).theory == "simulated"
-        assert Scene(surface, pressures=[0.01], effects=["area"]).theory == "simulated"
+        assert Scene(surface, pressure=[0.01], quantities=["area"]).theory == "simulated"
         # any pressure is answered, and where none was tested is told
         assert (np.diff(found.area) > 0).all()
         assert found.area[0] == 0

@@ -74,7 +74,7 @@ def test_laws_scenes_and_other_units(surface, own):
     law = contact_law(own)
     known = contact_law(surface, theory=FULL)
     np.testing.assert_array_equal(law.block, known.block)
-    found = Scene(own, pressures=[0.01, 0.02], effects=["pressure", "area"]).run()
+    found = Scene(own, pressure=[0.01, 0.02]).run()
     np.testing.assert_allclose(found.area, contact(own, pressure=[0.01, 0.02]).area)
     moved = contact(own.to("mm"), pressure=0.01)
     one = contact(own, pressure=0.01)

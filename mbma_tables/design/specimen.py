@@ -16,7 +16,7 @@ from mbma_tables.common.netcdf import is_own
 from mbma_tables.common.plain_text import visible
 from mbma_tables.common.toml_files import check, read_toml
 from mbma_tables.common.units import Units, factor, in_one_unit, in_unit, known
-from mbma_tables.design.scenes.problem import effects
+from mbma_tables.contacts.quantities.registry import registry
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import ROUGHNESS
 from mbma_tables.surfaces.self_affine import CASES, PARAMETERS
@@ -173,7 +173,7 @@ def effective_modulus_of(
 
 def refuse_joint(path: pathlib.Path, entries: Mapping[str, Any]) -> None:
     """Raise an error for the file of a joint, with the commands that read it."""
-    if "bodies" in entries or "part_a" in entries:
+    if "part_a" in entries:
         raise InputError(
             f"{path} describes a joint, not one surface: `mbma joint {path} --pressure 1MPa` has its results, and "
             f"`mbma export TARGET --joint {path} --pressures 1MPa:50MPa --out FILE` writes it for other programs"
@@ -181,9 +181,13 @@ def refuse_joint(path: pathlib.Path, entries: Mapping[str, Any]) -> None:
 
 
 def read_specimen(path: pathlib.Path) -> Specimen:
-    """The specimen of a TOML file with the tables [surface] and [material] of a scene."""
+    """The specimen of a TOML file with the table [surface] of a scene, and [material]."""
     entries = read_toml(path, "surface")
-    tables = {name: schema()["properties"][name] for name in ("surface", "material")}
+    content = schema()
+    tables = {
+        "surface": content["properties"]["surface"],
+        "material": content["$defs"]["material"],
+    }
     refuse_joint(path, entries)
     try:
         check(
@@ -244,9 +248,10 @@ def _from_table(surface: Mapping[str, Any], folder: pathlib.Path, title: str) ->
 
 
 def schema() -> dict[str, Any]:
-    """The JSON schema of scene files, as published in the package, with the names of all quantities as effects."""
-    path = pathlib.Path(__file__).with_name("scene.schema.json")
+    """The JSON schema of scene files, as published in the package, with the names of all quantities."""
+    path = pathlib.Path(__file__).with_name("scenes") / "scene.schema.json"
     content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    effects_on = content["properties"]["effects"]["properties"]["on"]
-    effects_on["items"] = {"type": "string", "enum": list(effects())}
+    items = content["properties"]["quantities"]["items"]
+    # with that of `Contact.leakage`, which stands for several
+    items["enum"] = [*registry(), "leakage"]
     return content
