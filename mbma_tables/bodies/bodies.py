@@ -170,11 +170,12 @@ class Bodies:
             raise InputError(
                 "bodies are missing: a modulus such as '100 GPa', metals by name, or Bodies"
             )
-        if isinstance(given, Mapping):
-            # two moduli are those of two bodies, a metal has one
-            if given.keys() & {"E_star", "metals"} or is_array(given.get("E")):
-                require_fields(cls, given)
-                return cls(**given)
+        # two moduli are those of two bodies, a metal has one
+        if isinstance(given, Mapping) and (
+            given.keys() & {"E_star", "metals"} or is_array(given.get("E"))
+        ):
+            require_fields(cls, given)
+            return cls(**given)
         if names_metals(given):
             return cls(metals=given)
         return cls(given)
