@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from mbma_tables.design.scenes.scene import Scene
 
 TABLES = ("universal", "island4d")  # island models that are tables
+LEAKAGE = "leakage"  # of `Contact.leakage`: several quantities under one name
 ISLAND_SHARE = 0.5  # share of a step's tolerance; the rest is for its quadrature
 AMPLIFICATION = {
     # gaps that follow from pressures add their error to that of the values

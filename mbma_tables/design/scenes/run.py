@@ -21,8 +21,7 @@ from mbma_tables.common.plots import Curve, theory_label
 from mbma_tables.common.progress import doing
 from mbma_tables.contacts.quantities.declaration import of_yielding_contacts
 from mbma_tables.contacts.quantities.registry import registry, unit_of
-from mbma_tables.design.scenes.plan import AMPLIFICATION, TABLES, Plan, Step
-from mbma_tables.design.scenes.scene import LEAKAGE, Scene
+from mbma_tables.design.scenes.plan import AMPLIFICATION, LEAKAGE, TABLES, Plan, Step
 from mbma_tables.islands.island_models import RigidModel, answer_islands
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.self_affine import PARAMETERS
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from mbma_tables.contacts.result import Contact
+    from mbma_tables.design.scenes.scene import Scene
     from mbma_tables.theories.mbma.profile import Shape
 
 

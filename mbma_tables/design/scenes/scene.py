@@ -27,7 +27,7 @@ from mbma_tables.common.units import require_surface
 from mbma_tables.contacts.quantities.registry import registry
 from mbma_tables.contacts.question import Question
 from mbma_tables.contacts.result import Contact, Setup
-from mbma_tables.design.scenes.plan import Plan, make_plan
+from mbma_tables.design.scenes.plan import LEAKAGE, Plan, make_plan
 from mbma_tables.design.specimen import from_tables, refuse_joint, schema
 from mbma_tables.islands.island_models import beside
 from mbma_tables.islands.variants import Variant, get_variant
@@ -40,7 +40,6 @@ from mbma_tables.theories.named import OF_MAPS, options_of
 if TYPE_CHECKING:
     import xarray
 
-LEAKAGE = "leakage"  # of `Contact.leakage`: several quantities under one name
 # the steps of arguments that ask by themselves, as plans list what is not requested
 BY_ARGUMENTS = {
     "deltas": "pressure_profile",
