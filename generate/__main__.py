@@ -25,6 +25,7 @@ COMMANDS = {
     "artefacts": "generate.machined.artefacts",
     "edges": "generate.machined.edges",
     "formulas": "generate.formulas",
+    "gas_flow": "generate.gas_flow",
     "machined": "generate.machined.campaign",
     "quantities": "generate.quantities",
     "rough_spheres": "generate.rough_spheres",

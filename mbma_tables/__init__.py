@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from mbma_tables.contacts.law.make import contact_law as contact_law
     from mbma_tables.contacts.quantities.interface import Gas as Gas
     from mbma_tables.contacts.result import Contact as Contact
+    from mbma_tables.contacts.sealing import sealing_pressure as sealing_pressure
     from mbma_tables.design.functions import contact_function as contact_function
     from mbma_tables.design.joint import Joint as Joint
     from mbma_tables.design.scenes.scene import Scene as Scene
@@ -60,6 +61,7 @@ _HOMES = {
     "island": "mbma_tables.theories.mbma.island",
     "open_table": "mbma_tables.tables.open",
     "rough_contact": "mbma_tables.effects.rough_contact",
+    "sealing_pressure": "mbma_tables.contacts.sealing",
     "sensitivity": "mbma_tables.design.sensitivity",
     "uncertainty": "mbma_tables.design.uncertainty",
     # modules

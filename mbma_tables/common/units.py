@@ -62,11 +62,11 @@ _NAMES_OF_POWERS = {
         "h_rms h_max Ra Rq Rsm Sa Sq Sp longest shortest rolloff separation "
         "mean_separation delta R_d R_u sigma h_d overclosure separations "
         "mean_separations deltas dx dy short_cutoff long_cutoff s_filter l_filter "
-        "extrapolate_to width displacement radius approach reference"
+        "extrapolate_to width length displacement radius approach reference"
     ),
     (0, 1): (
         "viscosity pressure_drop E_star E E1 E2 hardness pressure pressures shear "
-        "gas_pressure"
+        "gas_pressure inlet outlet"
     ),
     (-1, 0): "q0 q1",
     (-2, 0): "D m4",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from mbma_tables.common.arguments import (
     finite_array,
     is_labelled,
     positive_array,
+    require,
     rows,
 )
 from mbma_tables.common.display import Displayed, Variable, shown
@@ -24,7 +26,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.plots import draw_compression, leakage_label, pressure_label
 from mbma_tables.common.shared import shared, shared_property
-from mbma_tables.common.units import Dimension
+from mbma_tables.common.units import Dimension, Units, factor
 from mbma_tables.contacts.quantities.declaration import (
     DIMENSIONLESS,
     on_request,
@@ -36,6 +38,7 @@ from mbma_tables.contacts.quantities.effective_medium import (
     contact_factor,
     wide_gap,
 )
+from mbma_tables.contacts.quantities.gas_flow import GasFlow, gas_for_flow, mass_flow
 from mbma_tables.contacts.quantities.state import State
 from mbma_tables.contacts.quantities.validity import reasons_with_masks, valid_where_none
 from mbma_tables.core import core
@@ -268,6 +271,91 @@ class Leakage(Displayed):
         return self.K * (
             found["pressure_drop"] / (12 * found["viscosity"] * found["width"])
         )
+
+    def gas(
+        self,
+        gas: str | Mapping[str, Any],
+        inlet: ArrayLike | str,
+        outlet: ArrayLike | str,
+        width: ArrayLike | str,
+        length: ArrayLike | str | None = None,
+        temperature: ArrayLike = 293.15,
+        unit: str = "kg/s",
+    ) -> Any:
+        """Gas that leaks per time, from continuum through slip to free molecules, at constant temperature.
+
+        Parameters
+        ----------
+        gas : {"air", "helium", "nitrogen", "argon", "hydrogen", "methane"} or mapping
+            Or its own "mass" [kg/mol] and "viscosity" [Pa s].
+        inlet, outlet : array_like or str
+            Absolute pressures [Pa], such as "2 bar"; 0 is a vacuum.
+        width : array_like or str
+            Of the seal, along the flow [length].
+        length : array_like or str, optional
+            Of the seal, across the flow [length]; by default a metre.
+        temperature : array_like
+            [K]; of named gases from 200 to 600.
+        unit : str
+            "kg/s", "g/s", "mg/s", "g/h" or "mg/h"; "mbar l/s" or "Pa m^3/s", pressure times
+            volume at that temperature; "sccm", cm^3 a minute at 0 deg C and 1 atm.
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            For numbers that are not positive and finite, an outlet above the inlet, units
+            that cannot be converted, and a surface whose unit of length is not known.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact
+        >>> seal = Surface(hurst=0.8, q0=0.01, q1=1.0, h_rms=1.0, h_max=3.5, unit="um")
+        >>> found = contact(seal, "10 MPa", area=0.1, theory="calibrated").leakage
+        >>> rate = found.gas("helium", "1 bar", "0 bar", "2 mm", "0.3 m", unit="mbar l/s")
+        >>> f"{rate:.1e} mbar l/s"
+        '1.9e-02 mbar l/s'
+        """
+        units = self._contact.unit_system
+        if units.length is None:
+            raise InputError(
+                "a leak rate of a gas beside lengths whose unit is not known: give the surface "
+                "its unit"
+            )
+        metre = factor("m", units.length)
+        flowing = gas_for_flow(gas, temperature)
+        in_unit = flowing.in_unit(unit)
+        pascals = Units(stress="Pa")
+        given = {
+            "width": units.number("width", width),
+            "inlet": pascals.number("inlet", inlet),
+            "outlet": pascals.number("outlet", outlet),
+            "length": metre if length is None else units.number("length", length),
+            **dict(zip(GasFlow._fields, flowing, strict=True)),
+            "in_unit": in_unit,
+        }
+        arrays = {"K": self.K, "area": self._contact.area} | given
+
+        def rate(
+            theory: Theory,
+            surface: Any,
+            u: Any,
+            E_star: Any,
+            K: Any,
+            area: Any,
+            *seal: Any,
+        ) -> tuple[FloatArray]:
+            across, high, low, size, *of_gas, factor_of_unit = seal
+            for name, value in (("width", across), ("inlet", high), ("length", size)):
+                positive_array(name, value)
+            low = finite_array("outlet", low)
+            is_below = (low >= 0) & (low <= high)
+            require("outlet", low, is_below, "from 0 to the inlet's pressure")
+            per_metre = mass_flow(
+                K / metre**3, area, GasFlow(*of_gas), high, low, across / metre
+            )
+            return (per_metre * (size / metre) * factor_of_unit,)
+
+        return self._contact.evaluate(rate, 1, arrays)[0]
 
 
 def leakage_of(contact: Any) -> Leakage:
