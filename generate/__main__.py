@@ -18,13 +18,14 @@ COMMANDS = {
         for name in ("audit", "calibrated", "cost", "explorer", "leakage_law", "wheels")
     },
     **dict.fromkeys(
-        ("boundary_elements", "gaps", "grids", "light", "measured_maps"),
+        ("boundary_elements", "gas", "grids", "light", "measured_maps"),
         "generate.boundary_elements.run",
     ),
     **dict.fromkeys(("film", "tangential"), "generate.machined.studies"),
     "artefacts": "generate.machined.artefacts",
     "edges": "generate.machined.edges",
     "formulas": "generate.formulas",
+    "gaps": "generate.gaps",
     "gas_flow": "generate.gas_flow",
     "machined": "generate.machined.campaign",
     "quantities": "generate.quantities",

@@ -1,4 +1,4 @@
-"""`python -m generate boundary_elements`, `grids`, `measured_maps`, `light` and `gaps`: simulated maps.
+"""`python -m generate boundary_elements`, `grids`, `measured_maps`, `light` and `gas`: simulated maps.
 
 Campaigns are run, or what there is of them gathered into one netCDF file; `variables.toml`
 describes its variables.
@@ -22,6 +22,7 @@ from tqdm import tqdm
 
 from generate.boundary_elements.solve import (
     HARDNESSES,
+    RANGES,
     SOLVERS,
     Contact,
     Solve,
@@ -53,18 +54,30 @@ from mbma_tables.surfaces.treatment import Treated, mirrored
 from mbma_tables.theories.dataset import FILE
 from mbma_tables.theories.simulated.boundary_elements import LOADS
 from mbma_tables.theories.simulated.boundary_elements import Contact as YieldingContact
+from mbma_tables.theories.simulated.map_gaps import OPEN_SHARES
 
 TEXTS = tomllib.loads(
     pathlib.Path(__file__).with_name("variables.toml").read_text(encoding="utf-8")
 )
-DIMENSIONS = ("surface", "load", "quantile", "top", "band", "band_or_end", "axis")
-COORDINATES: dict[str, Any] = {"quantile": QUANTILES, "top": FRACTIONS, "eta": HARDNESSES}
+DIMENSIONS = (
+    *("surface", "load", "quantile", "top", "band", "band_or_end", "axis"),
+    *("share_open", "range"),
+)
+COORDINATES: dict[str, Any] = {
+    "quantile": QUANTILES,
+    "top": FRACTIONS,
+    "eta": HARDNESSES,
+    "share_open": OPEN_SHARES,
+    "range": RANGES,
+}
 BITS = {
     "band_energy": 10,
     "residual": 4,
     "seconds": 7,
+    "gap_quantile": 12,
+    "gap_moment": 14,
 }  # of mantissas that are kept; of others 24, of force 53
-LOADED = {"band_energy", "flow"}
+LOADED = {"band_energy", "flow", "gap_quantile", "gap_moment"}
 
 
 def run(
@@ -492,7 +505,7 @@ def gap_errors(kind: str) -> pd.DataFrame:
     surfaces, else NaN.
     """
     found = []
-    recipes = [Recipe(*row) for row in CAMPAIGNS["gaps"][kind]]
+    recipes = [Recipe(*row) for row in CAMPAIGNS["gas"][kind]]
     for recipe, eta in itertools.product(recipes, GAP_HARDNESSES[kind]):
         surface, _, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
         h_rms = float(surface.std())
@@ -532,7 +545,7 @@ def gap_errors(kind: str) -> pd.DataFrame:
 
 
 @click.command()
-def gaps() -> None:
+def gas() -> None:
     """Print errors of a gas's conductance against gaps of boundary elements, for docs/joints.md: six minutes."""
     for kind in GAP_HARDNESSES:
         known = gap_errors(kind)

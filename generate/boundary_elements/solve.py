@@ -24,6 +24,7 @@ from mbma_tables.surfaces.bearing_curve import band_sums, bearing, radial_bands
 from mbma_tables.theories.simulated import boundary_elements
 from mbma_tables.theories.simulated.boundary_elements import CORRECTION, TOLERANCE
 from mbma_tables.theories.simulated.boundary_elements import LOADS as LOADS
+from mbma_tables.theories.simulated.map_gaps import OPEN_SHARES
 from mbma_tables.theories.simulated.reynolds import flow_conductance
 
 # beyond LOADS, where heavy tails of the gradient keep gaps open
@@ -96,6 +97,8 @@ FLOW_AREAS = (
     0.35,
     0.4,
 )  # that loads of surfaces that yield aim at
+RANGES = np.geomspace(0.001, 10.0, 25)  # of attractions, over h_rms
+GAP_TOLERANCE = 1e-5
 LARGE = 1024
 OF_FLOW = ("area", "area_raw", "mean_separation", "residual", "seconds")
 LENGTHS = (
@@ -315,10 +318,35 @@ def solve_flow(recipe: Recipe) -> dict[str, Any]:
     return known | kept(rows, OF_FLOW, h_rms) | found
 
 
+def solve_gaps(recipe: Recipe) -> dict[str, Any]:
+    """Contact and distribution of gaps of one surface: lengths in h_rms, force in A0 E* g."""
+    surface, _, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
+    h_rms = float(surface.std())
+    contact = boundary_elements.Contact(surface, recipe.sizes, GAP_TOLERANCE)
+    forces = [load_at(area, np.inf) for area in AREAS]
+    rows = list[dict[str, float]]()
+    quantiles = list[FloatArray]()
+    moments = list[FloatArray]()
+    for force in forces:
+        rows.append(contact.press(force))
+        open_gap = contact.gap[contact.traction <= 0] / h_rms
+        quantiles.append(np.quantile(open_gap, OPEN_SHARES))
+        decay = [np.exp(-open_gap / length).sum() / surface.size for length in RANGES]
+        moments.append(np.array(decay))
+    found = {
+        "engine": "conjugate gradients here",
+        "force": np.array(forces),
+        "gap_quantile": np.array(quantiles),
+        "gap_moment": np.array(moments),
+    }
+    return known | kept(rows, OF_FLOW, h_rms) | found
+
+
 SOLVERS: dict[str, Solve] = {
     "elastic": simulate,
     "hardness": simulate_capped,
     "leakage": solve_flow,
+    "gaps": solve_gaps,
 }
 
 

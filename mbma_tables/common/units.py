@@ -62,7 +62,7 @@ _NAMES_OF_POWERS = {
         "h_rms h_max Ra Rq Rsm Sa Sq Sp longest shortest rolloff separation "
         "mean_separation delta R_d R_u sigma h_d overclosure separations "
         "mean_separations deltas dx dy short_cutoff long_cutoff s_filter l_filter "
-        "extrapolate_to width length displacement radius approach reference"
+        "extrapolate_to width length displacement radius approach reference gap range"
     ),
     (0, 1): (
         "viscosity pressure_drop E_star E E1 E2 hardness pressure pressures shear "

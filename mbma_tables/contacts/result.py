@@ -351,6 +351,74 @@ class Contact(State, Displayed):
         """
         return sheared(self, friction, direction)
 
+    def gap_mean(self, function: Callable[[FloatArray], FloatArray]) -> Numbers:
+        """Mean of a function of the gap, over the nominal area where the contact is open.
+
+        Contact, whose gap is zero, is left out: add ``contact.area`` times the function's
+        value there. The distribution of gaps is the law of docs/adhesion.md, of a simulated
+        map that of the map itself.
+
+        Parameters
+        ----------
+        function : callable
+            Of an array of gaps [length], to an array of finite numbers of its shape.
+
+        Raises
+        ------
+        InputError
+            For a contact that yields, and a function of another shape.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from mbma_tables import Surface, contact
+        >>> face = Surface(hurst=0.8, q0=0.1, q1=3.2, h_rms=1.0, h_max=3.5, unit="um")
+        >>> pressed = contact(face, "1 GPa", area=0.1, theory="calibrated")
+        >>> near = pressed.gap_mean(lambda gap: np.exp(-gap / 0.1))
+        >>> f"{near:.3f}; open {pressed.gap_mean(np.ones_like):.2f}, mean gap {pressed.gap_mean(np.abs):.3f} um"
+        '0.076; open 0.90, mean gap 0.841 um'
+        """
+        from mbma_tables.contacts.quantities.gaps import mean_over_gaps
+
+        mean: Numbers = mean_over_gaps(self, function)
+        return mean
+
+    def gap_share(self, gap: ArrayLike | str) -> Numbers:
+        """Share of the nominal area with gaps of at most `gap`, contact included.
+
+        Parameters
+        ----------
+        gap : array_like or str
+            At least 0 [length], or as text with its unit; broadcasts with the contact.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, contact
+        >>> face = Surface(hurst=0.8, q0=0.1, q1=3.2, h_rms=1.0, h_max=3.5, unit="um")
+        >>> pressed = contact(face, "1 GPa", area=0.1, theory="calibrated")
+        >>> [f"{share:.3f}" for share in pressed.gap_share([0.0, 0.01, 0.1, 1.0])]
+        ['0.100', '0.116', '0.181', '0.634']
+        """
+        from mbma_tables.contacts.quantities.gaps import share_of_gaps
+
+        share: Numbers = share_of_gaps(self, gap)
+        return share
+
+    def gap_density(self, gap: ArrayLike | str) -> Numbers:
+        """Share of the nominal area per length of gap, of open gaps, at `gap` > 0 [1/length].
+
+        Beside contact edges it goes as gap^(-1/3).
+
+        Parameters
+        ----------
+        gap : array_like or str
+            Positive [length], or as text with its unit; broadcasts with the contact.
+        """
+        from mbma_tables.contacts.quantities.gaps import density_of_gaps
+
+        density: Numbers = density_of_gaps(self, gap)
+        return density
+
     def gap_conductance(
         self,
         gas: str = "air",

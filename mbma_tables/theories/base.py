@@ -311,6 +311,17 @@ class Theory(abc.ABC):
         """Of a simulated map, the theory that knows the flow through its gaps."""
         return None
 
+    def open_gaps(
+        self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Shares of the nominal area and gaps there [length], rising on a last axis.
+
+        Of elastic contacts of these mean separations and areas; by default by `gap_law`.
+        """
+        from mbma_tables.theories.gap_law import open_gaps
+
+        return open_gaps(mean_separation, area, surface.alpha, surface.h_rms)
+
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], the integral of F/(A0 E*) from u to last contact."""
         from scipy.integrate import tanhsinh

@@ -36,7 +36,7 @@ NODES = 96
 FULLEST = 1 - 1e-12
 BLOCK = 1 << 12  # contacts between two checks for Ctrl-C, each with NODES gaps
 # held-out simulations of gaps: jumps [h_rms], root mean square errors, smallest and
-# largest A/A0 (docs/joints.md, "Gas in the gaps", by `python -m generate gaps`)
+# largest A/A0 (docs/joints.md, "Gas in the gaps", by `python -m generate gas`)
 JUMPS = (0.03, 0.1, 0.3, 1.0, 3.0)
 ERRORS = (0.055, 0.034, 0.019, 0.008, 0.003)
 AREAS = (0.001, 0.75)

@@ -168,6 +168,12 @@ class ContactQuantities:
         return value
 
     @property
+    def median_gap(self) -> Numbers:
+        """Median of the open gaps [length], by the law of docs/adhesion.md, of a simulated map by the map itself."""
+        value: Numbers = self.quantity("median_gap")
+        return value
+
+    @property
     def error(self) -> Numbers:
         """Bound on the relative numerical error of pressure and area against the theory; NaN where not known."""
         value: Numbers = self.quantity("error")
@@ -481,6 +487,21 @@ class LawQuantities:
         value: Numbers = contact.quantity("leakage_scatter")
         return value
 
+    def median_gap(
+        self: Any,
+        mean_separation: ArrayLike | str | None = None,
+        *,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
+    ) -> Numbers:
+        """Median of the open gaps [length], by the law of docs/adhesion.md, of a simulated map by the map itself."""
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
+        value: Numbers = contact.quantity("median_gap")
+        return value
+
     def scatter(
         self: Any,
         mean_separation: ArrayLike | str | None = None,
@@ -706,6 +727,11 @@ class JointQuantities:
     def leakage_scatter(self: Any, pressure: ArrayLike | str) -> Numbers:
         """Model uncertainty, one standard deviation of ln of the flow coefficient."""
         value: Numbers = self.at_pressure(pressure).quantity("leakage_scatter")
+        return value
+
+    def median_gap(self: Any, pressure: ArrayLike | str) -> Numbers:
+        """Median of the open gaps [length], by the law of docs/adhesion.md, of a simulated map by the map itself."""
+        value: Numbers = self.at_pressure(pressure).quantity("median_gap")
         return value
 
     def error(self: Any, pressure: ArrayLike | str) -> Numbers:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import PchipInterpolator, interp1d
 
 from mbma_tables.common.arguments import FloatArray, require
 from mbma_tables.common.errors import InputError, OutOfRangeError
@@ -21,10 +21,11 @@ from mbma_tables.surfaces.map_simulation import (
     resolving,
 )
 from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.theories import gap_law
 from mbma_tables.theories.base import Theory, TheoryAnswer
 from mbma_tables.theories.calibrated.curves import own_law
 from mbma_tables.theories.calibrated.theory import Calibrated
-from mbma_tables.theories.simulated import own_map
+from mbma_tables.theories.simulated import map_gaps, own_map
 from mbma_tables.theories.simulated.energy_spline import LoadCurve
 from mbma_tables.theories.simulated.grids import (
     FULL,
@@ -326,6 +327,36 @@ class BoundaryElements(Theory):
 
     def gaps(self) -> Any:
         return self
+
+    @shared_property
+    def gaps_of_loads(self) -> FloatArray | None:
+        """Gaps over u at each load, at the shares of `gap_law`; None of a table without its map."""
+        if not isinstance(self.pressed, Press):
+            return None
+        force, area, u, _ = self.rows
+        gaps = [
+            map_gaps.of_map(self.pressed(load)[1], share, mean)
+            for load, share, mean in zip(force.tolist(), area, u, strict=True)
+        ]
+        return np.asarray(np.array(gaps) / u[:, None])
+
+    def open_gaps(
+        self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Those of the map, between loads by ln u; of a table without its map by `gap_law`."""
+        known = self.gaps_of_loads
+        if known is None:
+            return super().open_gaps(surface, mean_separation, area)
+        u, contact = np.broadcast_arrays(mean_separation, area)
+        log_u = np.log(self.rows[2])
+        with np.errstate(divide="ignore"):
+            x = np.clip(np.log(u), log_u[-1], log_u[0])
+        curve = interp1d(log_u[::-1], np.log(known[::-1]), axis=0)
+        _, weight = gap_law.rule()
+        share = weight * (1 - contact[..., None])
+        gaps = np.exp(curve(x))
+        mean = (share * gaps).sum(axis=-1, keepdims=True)
+        return share, gaps * (u[..., None] / mean)
 
     @shared_property
     def flows(self) -> tuple[FloatArray, FloatArray]:
