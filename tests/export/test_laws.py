@@ -248,10 +248,18 @@ test_what_a_solver_does_not_take = refusals(
         "closer than 1e-10 m",
     ),
     (
-        "optistruct",
-        HEAT,
-        "takes pressure against overclosure here, got solid_conductance against pressure",
+        "ansys",
+        {},
+        "takes total_conductance against pressure or .* here, got pressure against",
     ),
+    (
+        "freecad",
+        HEAT
+        | {"conductivity_unit": "S/m", "length_unit": "m", "stress_unit": "Pa"}
+        | {"rows": 20},
+        "takes conductances of heat, .* got one in S/m/m",
+    ),
+    ("freecad", HEAT, "FreeCAD takes m and Pa here, got mm and MPa"),
     *(
         (name, LEAKAGE | {"rows": 50}, "takes pressure against overclosure")
         for name in ("abaqus", "calculix")

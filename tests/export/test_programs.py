@@ -3,12 +3,15 @@
 import pathlib
 import re
 import subprocess
+import sys
+import types
+from unittest import mock
 
 import numpy as np
 import pytest
 from law_points import needs
 
-from mbma_tables import Surface, contact, contact_law
+from mbma_tables import Joint, Surface, contact, contact_law
 from mbma_tables.export.rows import solvers
 from mbma_tables.export.rows.data import matlab_reader, to_csv, to_matlab, to_netcdf
 from mbma_tables.export.rows.law_rows import describe_law
@@ -264,6 +267,71 @@ def test_calculix_conducts_as_the_law_says(tmp_path, length, stress):
     np.testing.assert_allclose(
         conductance(flux, side), found.stiffness * CONDUCTIVITY / (25 * unit), rtol=1e-2
     )
+
+
+class Slope(str):
+    """A quantity of FreeCAD as far as its writer asks for it."""
+
+    def in_mpa_per_mm(self):
+        value, unit = self.split(" ")
+        assert unit == "MPa/mm"
+        return float(value)
+
+
+def card_of_freecad(macro):
+    """What FreeCAD's write_constraint_contact.py writes of a selected contact after the macro."""
+    contact = types.SimpleNamespace(Friction=False)
+    selection = types.SimpleNamespace(getSelection=lambda: [contact])
+    gui = types.SimpleNamespace(Selection=selection)
+    with mock.patch.dict(sys.modules, FreeCADGui=gui):
+        exec(macro, {})
+    assert contact.SurfaceBehavior == "Linear"
+    slope = Slope(contact.Slope).in_mpa_per_mm()
+    card = f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n{slope:.13G}\n"
+    if contact.Friction:
+        stick = Slope(contact.StickSlope).in_mpa_per_mm()
+        card += f"*FRICTION\n{contact.FrictionCoefficient:.13G}, {stick:.13G}\n"
+    if contact.EnableThermalContact:
+        lines = [f"{value}\n" for value in contact.ThermalContactConductance]
+        card += f"*GAP CONDUCTANCE\n{''.join(lines)}"
+    return f"*SURFACE INTERACTION, NAME=ROUGH\n{card}"
+
+
+@needs("ccx")
+def test_what_freecad_writes_for_calculix_conducts_as_the_law_says(tmp_path):
+    pressures = np.geomspace(1.1e-3, 1.9, 8)  # MPa
+    law = describe_law(
+        ROUGH,
+        "25 MPa",
+        length_unit="m",
+        stress_unit="Pa",
+        quantity="solid_conductance",
+        conductivity=CONDUCTIVITY,
+        conductivity_unit="W/(m K)",
+        pressures=("1 kPa", "2 MPa"),
+        rows=20,
+        theory="mbma",
+    )
+    card = card_of_freecad(solvers.freecad(law))
+    forces = (f"*CLOAD\n{each(TOP, f'3, {-p * 100 / 4:.9e}')}" for p in pressures)
+    said, _, flux = calculix(heated(card, forces, 10.0, 1e6), tmp_path)
+    assert len(flux) == 8, said.stdout[-2000:]
+    found = contact(ROUGH.to("mm"), 25.0, pressure=pressures, theory="mbma")
+    expected = found.stiffness * CONDUCTIVITY / 25.0
+    np.testing.assert_allclose(conductance(flux), expected, rtol=1e-2)
+
+
+def test_a_macro_of_freecad_has_the_friction_of_the_joint():
+    face = Surface(0.8, 0.06, 3.0, 1.0, 3.5, unit="um")
+    joint = Joint(face, bodies="steel 4140 hard", nominal_area="4 cm^2", friction=0.2)
+    asked = {"quantity": "solid_conductance", "friction_pressure": "5 MPa", "rows": 5}
+    pressures = ("1 MPa", "50 MPa")
+    macro = joint.export("freecad", pressures, length_unit="m", stress_unit="Pa", **asked)
+    friction = re.search(r"\*FRICTION\n(\S+), (\S+)\n", card_of_freecad(macro))
+    at = joint.at_pressure("5 MPa")
+    # of a small unloading, over kappa: in GPa/um, of which one is 1e6 MPa/mm
+    assert float(friction[1]) == 0.2
+    assert float(friction[2]) == pytest.approx(1e6 * at.tangential_stiffness, rel=1e-3)
 
 
 @needs("Rscript")

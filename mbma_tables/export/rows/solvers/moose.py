@@ -1,5 +1,6 @@
 """Contact laws as piecewise linear functions of MOOSE, by its `PiecewiseTabularBase`."""
 
+import math
 import re
 from collections.abc import Sequence
 
@@ -12,7 +13,10 @@ from mbma_tables.export.rows.solvers.comsol import (
     read_columns,
 )
 from mbma_tables.export.targets import RowFormat
-from mbma_tables.export.text import number
+from mbma_tables.export.text import about, number, opening
+
+# points of a formula that is read back
+FITTED = 200
 
 
 def _functions(law: LawTable, name: str) -> str:
@@ -40,6 +44,71 @@ def _blocks(law: LawTable, name: str) -> str:
             "  []\n"
         )
     return text
+
+
+def _proportional(law: LawTable, name: str) -> str:
+    """The number of `GapFluxModelPressureDependentConduction`, whose conductance is proportional to pressure."""
+    fitted = (law.x > 0) & (law.y >= law.floor)
+    pressure = law.x[fitted]
+    log_ratio = np.log(law.y[fitted] / pressure)
+    # the one between the least and the largest
+    middle = (log_ratio.max() + log_ratio.min()) / 2
+    spread = (log_ratio.max() - log_ratio.min()) / 2
+    note = (
+        "The model's conductance, scaling k p/H with harmonic means k and H of both sides, is "
+        f"within {about(math.expm1(spread), 2)} of the law's from p = {about(pressure[0])} to "
+        f"{about(law.x[-1])} {law.x_unit} with these numbers, of which k and H are 1. Set "
+        "temperature, contact_pressure and boundary to those of your input; the material "
+        "belongs to the blocks of both sides."
+    )
+    return (
+        f"{opening([note], '#')}\n"
+        "[Materials]\n"
+        f"  [{name}_of_one]\n"
+        "    type = ADGenericConstantMaterial\n"
+        f"    prop_names = '{name}_conductivity {name}_hardness'\n"
+        "    prop_values = '1.0 1.0'\n"
+        "  []\n"
+        "[]\n"
+        "[UserObjects]\n"
+        f"  [{name}]\n"
+        "    type = GapFluxModelPressureDependentConduction\n"
+        "    temperature = temperature\n"
+        "    contact_pressure = contact_pressure\n"
+        "    boundary = interface\n"
+        f"    scaling_coefficient = {number(math.exp(middle))}\n"
+        f"    primary_conductivity = {name}_conductivity\n"
+        f"    secondary_conductivity = {name}_conductivity\n"
+        f"    primary_hardness = {name}_hardness\n"
+        f"    secondary_hardness = {name}_hardness\n"
+        "  []\n"
+        "[]\n"
+    )
+
+
+def _read_proportional(text: str) -> list[Curve]:
+    """The flux of `computeFlux` over the difference of temperatures, in the stated range."""
+    given = dict(re.findall(r"^    (\w+) = (\S+)$", text, re.M))
+    names = re.search(r"prop_names = '(\S+) (\S+)'\n +prop_values = '(\S+) (\S+)'", text)
+    assert names is not None
+    conductivity, hardness, *values = names.groups()
+    properties = dict(zip((conductivity, hardness), map(float, values), strict=True))
+    means = []
+    for quantity in ("conductivity", "hardness"):
+        sides = (given[f"{side}_{quantity}"] for side in ("primary", "secondary"))
+        first, second = (properties[each] for each in sides)
+        means.append(2 * first * second / (first + second))
+    words = " ".join(text.replace("\n#", " ").split())
+    stated = re.search(
+        r"of both sides, is within (\S+) of .*? from p = (\S+) to (\S+) ", words
+    )
+    assert stated is not None
+    misfit, low, high = map(float, stated.groups())
+    pressure = np.geomspace(low, high, FITTED)
+    scaling = float(given["scaling_coefficient"])
+    conductance = scaling * means[0] * pressure / means[1]
+    # the misfit has two digits
+    return [Curve("solid_conductance", pressure, conductance, 1.05 * misfit)]
 
 
 def _read_columns(text: str) -> list[Curve]:
@@ -94,4 +163,16 @@ moose_function = RowFormat(
     ),
     named="rough",
     several=_functions_of_several,
+)
+# of `GapFluxModelPressureDependentConduction.C`
+moose_pressure = RowFormat(
+    name="moose-pressure",
+    program="MOOSE",
+    output="`GapFluxModelPressureDependentConduction`, conductance proportional to pressure",
+    tested="MOOSE's formula, written again from its source: within the stated misfit",
+    read=_read_proportional,
+    mark="#",
+    body={"solid_conductance": _proportional},
+    beyond="For contacts pressed as hard as in this range: moose-function has the law itself.",
+    named="rough",
 )
