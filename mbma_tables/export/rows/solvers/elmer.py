@@ -39,7 +39,7 @@ elmer = RowFormat(
     tested="written according to the source of its heat equation, not tested",
     read=_read,
     mark="!",
-    body=dict.fromkeys(CONDUCTANCES, _elmer),
+    body=dict.fromkeys(reversed(CONDUCTANCES), _elmer),
     beyond=(
         "Elmer continues the last slope beyond the last row: stay within the range. These "
         "lines belong in a Boundary Condition of the interface, whose elements have two "

@@ -78,7 +78,7 @@ freecad = RowFormat(
     tested="executed with an object of these properties; CalculiX reads the lines",
     read=_read,
     mark="#",
-    body=dict.fromkeys(CONDUCTANCES, _freecad),
+    body=dict.fromkeys(reversed(CONDUCTANCES), _freecad),
     beyond=(
         "CalculiX keeps the value of the last row beyond it. FreeCAD has no closure by rows: "
         "the slope is the law's at the largest pressure alone, which does not change the "
