@@ -250,7 +250,7 @@ test_what_a_solver_does_not_take = refusals(
     (
         "ansys",
         {},
-        "takes total_conductance against pressure or .* here, got pressure against",
+        "takes solid_conductance against pressure or .* here, got pressure against",
     ),
     (
         "freecad",
