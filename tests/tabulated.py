@@ -95,6 +95,24 @@ def slow(x, y):
     return smooth(x, y)
 
 
+def replica(x, y, seed=0, *, unused=None):
+    """One of many calibrations: exponents that differ a little."""
+    return np.exp(x * y / 5) * x ** (1.5 + 0.02 * np.sin(7 * seed)), np.sin(x) * y
+
+
+def softer(x, y):
+    """Another variant of `smooth`."""
+    return np.exp(x * y / 6) * x**1.4, np.sin(x) * y
+
+
+def half_of_persson(hurst, zeta_1, gap):
+    """Totals of a theory with half of the pressure and area of Persson's."""
+    from mbma_tables.theories.totals import totals_of
+
+    found = totals_of("persson", of_h_max=False)(hurst, zeta_1, gap)
+    return {name: 0.5 * values for name, values in found.items()}
+
+
 def island(X, spread, sphere, hurst):
     """Force and area of the paper's island on the axes of the four-number table."""
     from mbma_tables.islands import greenwood_tripp

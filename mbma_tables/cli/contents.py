@@ -29,7 +29,7 @@ from mbma_tables.tables.schema import UNIVERSAL, TableContent
 ABOUT = {
     "schema": ("mbma_kind", "format_version", "Conventions", "spline_degree"),
     "certificate": (
-        *("target", "certificate", "largest_", "p99_", "median_", "visited_"),
+        *("target", "certificate", "largest_", "p99_", "median_", "visited_", "members"),
         *("error_field", "conformance", "out_of_range"),
     ),
     "provenance": (

@@ -231,13 +231,16 @@ def _make_of_function(
 @click.argument("language", metavar="{c|fortran|javascript|matlab|python}")
 @click.argument("table", type=click.Path(path_type=Path))
 @click.option("--name", default="table", show_default=True, help="Of the function.")
+@click.option("--member", help="Of a table with members: one, in place of its value.")
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
     default=Path(),
     help="Folder of the files; default: this one.",
 )
-def export_command(language: str, table: Path, name: str, out: Path) -> None:
+def export_command(
+    language: str, table: Path, name: str, member: str | None, out: Path
+) -> None:
     """Write TABLE, a file made of a function, as source code: an evaluator and the table as data.
 
     Each has a self-test; islands are exported by `mbma export c --table`.
@@ -254,7 +257,11 @@ def export_command(language: str, table: Path, name: str, out: Path) -> None:
         raise InputError(
             f"{table} holds islands: `mbma export c --table {table}` writes them as C"
         )
-    command = written_by([language, str(table), "--name", name], "tables export")
+    arguments = [language, str(table), "--name", name]
+    if member is not None:
+        opened = opened.member(member)
+        arguments += ["--member", member]
+    command = written_by(arguments, "tables export")
     for file, text in function_code(opened, language, name, command).items():
         write_file(out / file, text.encode(), make_folders=True)
         echo(out / file)

@@ -26,6 +26,7 @@ from mbma_tables.common.netcdf import opened, own_content
 from mbma_tables.common.shared import frozen, shared_property
 from mbma_tables.core import core
 from mbma_tables.tables.boxes import NO_ANSWER, POLYNOMIAL, tests
+from mbma_tables.tables.members import Members, Spread
 
 if TYPE_CHECKING:
     import netCDF4
@@ -95,12 +96,15 @@ class Looked:
         By output and by axis; empty unless asked for.
     derivative_error : dict of str to dict of str to ndarray
         Bounds on their absolute errors.
+    spread : dict of str to Spread
+        Each output over the members of the table; empty unless asked for.
     """
 
     values: dict[str, Any]
     error: dict[str, Any]
     derivatives: dict[str, dict[str, Any]]
     derivative_error: dict[str, dict[str, Any]]
+    spread: dict[str, Spread] = dataclasses.field(default_factory=dict)
 
     def __getitem__(self, output: str) -> Any:
         return self.values[output]
@@ -140,10 +144,108 @@ class FunctionTable:
         largest = json.loads(self.attributes["certificate"])["largest_error"]
         errors = ", ".join(f"{name} {error:.2g}" for name, error in largest.items())
         cells = self.arrays["starts"].size
+        members = ""
+        if self.members is not None:
+            members = f"{len(self.members.names)} members ({self.members.rule}), "
         return (
             f"FunctionTable({self.attributes['function']}: covers {ranges}, {cells} cells, "
-            f"largest held-out error {errors})"
+            f"{members}largest held-out error {errors})"
         )
+
+    @shared_property
+    def members(self) -> Members | None:
+        """Its members and their rule; None for a table without any."""
+        text = self.attributes.get("members")
+        return None if text is None else Members.from_json(json.loads(text))
+
+    def _require_members(self) -> Members:
+        if self.members is None:
+            raise InputError(
+                "this table has no members: a configuration's [members] makes them"
+            )
+        return self.members
+
+    def _of_members(self, chosen: slice, exact: FloatArray) -> dict[str, Any]:
+        """The arrays of some of the stored members, each with all outputs."""
+        members = len(self._require_members().stored)
+        outputs = len(self.outputs)
+        starts = self.arrays["starts"].astype(int) * members
+        blocks = np.split(self.arrays["member_coefficients"], starts[1:])
+        count = len(range(members)[chosen])
+        parts = [block.reshape(members, -1)[chosen].ravel() for block in blocks]
+        errors = self.arrays["member_errors"].reshape(-1, members, outputs)[:, chosen]
+        return {
+            **{name: self.arrays[name] for name in ("branches", "middles", "terms")},
+            "starts": self.arrays["starts"] * count,
+            "coefficients": np.concatenate(parts),
+            "errors": errors.reshape(len(errors), -1),
+            "conformance_x": self.arrays["conformance_x"],
+            "conformance_exact": exact,
+        }
+
+    @shared_property
+    def _members_table(self) -> FunctionTable:
+        """The stored members as outputs of one table."""
+        outputs = self.outputs * len(self._require_members().stored)
+        arrays = self._of_members(slice(None), self.arrays["member_exact"])
+        plain = {n: v for n, v in self.attributes.items() if n != "members"}
+        return FunctionTable(self.axes, outputs, arrays, plain)
+
+    def member(self, name: str) -> FunctionTable:
+        """A member as a table of its own.
+
+        Parameters
+        ----------
+        name : str
+            One of ``members.names``.
+
+        Raises
+        ------
+        InputError
+            For a table without members, or without this one.
+        """
+        members = self._require_members()
+        number = members.index(name)
+        attributes = {n: v for n, v in self.attributes.items() if n != "members"}
+        if members.functions:
+            own = dict(zip(members.names, members.functions, strict=True))
+            attributes["function"] = own[name]
+        attributes["title"] = f"{attributes['title']}, member {name}"
+        if number < 0:
+            arrays = {n: v for n, v in self.arrays.items() if not n.startswith("member_")}
+            return FunctionTable(self.axes, self.outputs, arrays, attributes)
+        certificate = json.loads(attributes["certificate"])
+        largest = certificate.pop("largest_error_of_members")[name]
+        attributes["certificate"] = json.dumps(certificate | {"largest_error": largest})
+        outputs = len(self.outputs)
+        columns = slice(number * outputs, (number + 1) * outputs)
+        exact = self.arrays["member_exact"][:, columns]
+        arrays = self._of_members(slice(number, number + 1), exact)
+        return FunctionTable(self.axes, self.outputs, arrays, attributes)
+
+    def _spread(
+        self,
+        x: FloatArray,
+        values: FloatArray,
+        bounds: FloatArray,
+        shape: tuple[int, ...],
+    ) -> dict[str, Spread]:
+        """Each output over the members, at points whose values and bounds are these."""
+        members = self._require_members()
+        table = self._members_table
+        of_members, _, errors, _ = table._answers(x, False)
+        off = table._absolute(of_members, errors)
+        spread = {}
+        for k, output in enumerate(self.outputs):
+            rows, row_errors = (
+                part.reshape(len(x), -1, len(self.outputs))[:, :, k].T
+                for part in (of_members, off)
+            )
+            found = members.spread(values[:, k], bounds[:, k], rows, row_errors)
+            spread[output.name] = Spread(
+                *(part.reshape((*part.shape[:-1], *shape))[()] for part in found)
+            )
+        return spread
 
     @shared_property
     def core_arrays(self) -> dict[str, Any]:
@@ -280,7 +382,11 @@ class FunctionTable:
         return np.ascontiguousarray(np.stack(flat, axis=-1)), shape
 
     def lookup(
-        self, *arguments: ArrayLike, derivatives: int = 0, **named: ArrayLike
+        self,
+        *arguments: ArrayLike,
+        derivatives: int = 0,
+        members: bool = False,
+        **named: ArrayLike,
     ) -> Looked:
         """Values with bounds on their errors, and derivatives.
 
@@ -291,6 +397,8 @@ class FunctionTable:
             and DataArrays give DataArrays.
         derivatives : {0, 1}
             1: first derivatives by every axis too.
+        members : bool
+            Whether each output's `spread` over the members of the table is answered too.
 
         Returns
         -------
@@ -301,13 +409,13 @@ class FunctionTable:
         OutOfRangeError
             Outside an axis whose policy is "raise".
         InputError
-            For a name that is no axis, or NaN.
+            For a name that is no axis, or NaN; for members of a table that has none.
         """
         if derivatives not in (0, 1):
             raise InputError(f"derivatives must be 0 or 1, got {derivatives!r}")
         columns = self._columns(arguments, named)
         if any(map(is_labelled, columns)):
-            return self._labelled(columns, derivatives)
+            return self._labelled(columns, derivatives, members)
         x, shape = self._points(columns)
         values, slopes, errors, cells = self._answers(x, derivatives == 1)
         bounds = self._absolute(values, errors)
@@ -329,33 +437,47 @@ class FunctionTable:
             {name: bounds[:, k].reshape(shape)[()] for k, name in enumerate(names)},
             by_output,
             slope_errors,
+            self._spread(x, values, bounds, shape) if members else {},
         )
 
-    def _labelled(self, columns: list[ArrayLike], derivatives: int) -> Looked:
+    def _labelled(
+        self, columns: list[ArrayLike], derivatives: int, members: bool
+    ) -> Looked:
         """The answer as DataArrays, with units."""
         import xarray
 
         together = xarray.broadcast(*map(xarray.DataArray, columns))
         found = self.lookup(
-            *(column.values for column in together), derivatives=derivatives
+            *(column.values for column in together),
+            derivatives=derivatives,
+            members=members,
         )
 
         def labelled(values: Any, unit: str) -> Any:
+            if np.ndim(values) > together[0].ndim:
+                names = self._require_members().names
+                coordinate = xarray.Variable("member", [*names])
+                like = together[0].expand_dims(member=coordinate)
+                return like.copy(data=values).assign_attrs(units=unit)
             return together[0].copy(data=np.asarray(values)).assign_attrs(units=unit)
 
         units = {output.name: output.unit for output in self.outputs}
-        nested = (
+        slopes, slope_errors = (
             {
                 name: {a: labelled(v, "") for a, v in by_axis.items()}
                 for name, by_axis in part.items()
             }
             for part in (found.derivatives, found.derivative_error)
         )
-        plain = (
+        values, errors = (
             {name: labelled(values, units[name]) for name, values in part.items()}
             for part in (found.values, found.error)
         )
-        return Looked(*plain, *nested)
+        spread = {
+            name: Spread(*(labelled(part, units[name]) for part in parts))
+            for name, parts in found.spread.items()
+        }
+        return Looked(values, errors, slopes, slope_errors, spread)
 
     def _absolute(self, values: FloatArray, errors: FloatArray) -> FloatArray:
         """Bounds on absolute errors from those that are stored."""
@@ -515,7 +637,10 @@ class FunctionTable:
         x, exact = self.arrays["conformance_x"], self.arrays["conformance_exact"]
         values, _, errors, _ = self._answers(np.ascontiguousarray(x), False)
         bounds = self._absolute(values, errors)
-        return len(x), float(np.max(np.abs(values - exact) / bounds, initial=0.0))
+        excess = float(np.max(np.abs(values - exact) / bounds, initial=0.0))
+        if self.members is not None:
+            excess = max(excess, self._members_table.replayed()[1])
+        return len(x), excess
 
     def to_dataset(self, **axes: ArrayLike) -> xr.Dataset:
         """Every output and the bound on its error on a grid, as an xarray Dataset.
@@ -530,7 +655,8 @@ class FunctionTable:
             axis.name: np.atleast_1d(finite_array(axis.name, column))
             for axis, column in zip(self.axes, columns, strict=True)
         }
-        found = self.lookup(*np.ix_(*lines.values()))
+        has_members = self.members is not None
+        found = self.lookup(*np.ix_(*lines.values()), members=has_members)
         names = tuple(lines)
         variables = {
             axis.name: Variable(lines[axis.name], axis.unit, axis.meaning, (axis.name,))
@@ -547,6 +673,15 @@ class FunctionTable:
                 f"bound on the absolute error of {output.name}",
                 names,
             )
+            if has_members:
+                ends = found.spread[output.name]
+                for end, values in (("low", ends.low), ("high", ends.high)):
+                    variables[f"{output.name}_{end}"] = Variable(
+                        values,
+                        output.unit,
+                        f"{end} end of {output.name} over the members",
+                        names,
+                    )
         return dataset_of(
             variables, {"table": KIND, "function": self.attributes["function"]}
         )
@@ -562,9 +697,27 @@ def table_in(dataset: netCDF4.Dataset) -> FunctionTable:
         shapes = [(len(points[0]), len(axes)), (len(points[0]), len(outputs))]
         if [array.shape for array in points] != shapes:
             raise ValueError("has incomplete conformance points")
-        return checked(FunctionTable(axes, outputs, values, attributes))
+        table = checked(FunctionTable(axes, outputs, values, attributes))
+        if table.members is not None:
+            checked(_with_members(table))
+        return table
     except (KeyError, TypeError) as fault:
         raise ValueError(f"lacks what a table of a function has: {fault}") from None
+
+
+def _with_members(table: FunctionTable) -> FunctionTable:
+    """The members' table of one whose members have all arrays, or ValueError."""
+    arrays = table.arrays
+    width = len(table.outputs) * len(table._require_members().stored)
+    sizes = {
+        "member_coefficients": arrays["coefficients"].size * width // len(table.outputs),
+        "member_errors": len(arrays["starts"]) * width,
+        "member_exact": len(arrays["conformance_x"]) * width,
+    }
+    for name, size in sizes.items():
+        if arrays[name].size != size:
+            raise ValueError(f"has {name} of {arrays[name].size} numbers, not {size}")
+    return table._members_table
 
 
 def read_function_table(path: os.PathLike[str] | str) -> FunctionTable:

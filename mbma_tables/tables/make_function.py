@@ -8,6 +8,7 @@ does not depend on who made which piece, nor on the number of processes.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import importlib
 import inspect
 import io
@@ -50,6 +51,7 @@ from mbma_tables.tables.function_table import (
     checked,
     read_function_table,
 )
+from mbma_tables.tables.members import RULES, Members
 from mbma_tables.tables.sources import versions
 
 HERE = pathlib.Path(__file__).parent
@@ -90,6 +92,13 @@ class Wanted:
     source: str
     axes: tuple[FunctionAxis, ...]
     outputs: tuple[Output, ...]
+    members: Members | None = None
+
+    @property
+    def stored(self) -> tuple[Output, ...]:
+        """Outputs of the table's value and of the members that are stored beside it."""
+        beside = 0 if self.members is None else len(self.members.stored)
+        return self.outputs * (1 + beside)
 
     @property
     def as_json(self) -> str:
@@ -102,16 +111,18 @@ class Wanted:
         entries = json.loads(text)
         entries["axes"] = tuple(FunctionAxis(**axis) for axis in entries["axes"])
         entries["outputs"] = tuple(Output(**output) for output in entries["outputs"])
+        if entries.get("members") is not None:
+            entries["members"] = Members.from_json(entries["members"])
         return cls(**entries)
 
     @property
     def aim(self) -> Aim:
         """What its pieces aim at."""
         return Aim(
-            np.full(len(self.outputs), self.target),
-            np.array([output.error == "relative" for output in self.outputs]),
-            np.array([output.least for output in self.outputs]),
-            np.array([output.transform == "log" for output in self.outputs]),
+            np.full(len(self.stored), self.target),
+            np.array([output.error == "relative" for output in self.stored]),
+            np.array([output.least for output in self.stored]),
+            np.array([output.transform == "log" for output in self.stored]),
         )
 
 
@@ -149,8 +160,10 @@ def function_of(reference: str) -> Callable[..., Any]:
     return cast(Callable[..., Any], function)
 
 
-def _ordered(function: Callable[..., Any], names: list[str], reference: str) -> list[str]:
-    """The axes in the order of the function's arguments."""
+def _ordered(
+    function: Callable[..., Any], names: list[str], reference: str, of_members: str = ""
+) -> list[str]:
+    """The axes in the order of the function's arguments; that of members is none of them."""
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):
@@ -169,8 +182,12 @@ def _ordered(function: Callable[..., Any], names: list[str], reference: str) -> 
             raise InputError(
                 f"{reference} has no argument {name!r}; {nearest(name, taken)}"
             )
+    if of_members and of_members not in taken + [p.name for p in parameters]:
+        raise InputError(
+            f"{reference} has no argument {of_members!r}; {nearest(of_members, taken)}"
+        )
     for name in needed:
-        if name not in names:
+        if name not in (*names, of_members):
             raise InputError(
                 f"axes.{name} is missing: {reference} takes {', '.join(taken)}"
             )
@@ -234,8 +251,8 @@ def wanted_of(
         merged = DEFAULTS | own
         if not math.isfinite(merged["target"]):
             raise InputError(f"target must be finite, got {merged['target']}")
-        function = function_of(merged["function"])
-        names = _ordered(function, list(merged["axes"]), merged["function"])
+        members = _members_of(merged)
+        names = _ordered_for_all(merged, members)
         axes = tuple(FunctionAxis(name, **merged["axes"][name]) for name in names)
         axes = tuple(
             dataclasses.replace(a, low=float(a.low), high=float(a.high)) for a in axes
@@ -251,7 +268,37 @@ def wanted_of(
             raise InputError(f"{both.pop()} names an axis and an output")
     except ValueError as fault:
         raise InputError(f"{place}: {fault}") from None
-    return Wanted(**(merged | {"axes": axes, "outputs": outputs}))
+    found = {"axes": axes, "outputs": outputs, "members": members}
+    return Wanted(**(merged | found))
+
+
+def _members_of(merged: Mapping[str, Any]) -> Members | None:
+    """The members of a configuration, if it has any."""
+    if "members" not in merged:
+        return None
+    return Members.from_entries(merged["members"], merged["function"])
+
+
+def _ordered_for_all(merged: Mapping[str, Any], members: Members | None) -> list[str]:
+    """The axes in the order of the arguments, which is that of each member's function."""
+    functions: tuple[str, ...] = (merged["function"],)
+    argument = ""
+    if members is not None:
+        functions = members.functions or functions
+        argument = members.argument
+    if argument in merged["axes"]:
+        raise InputError(f"{argument} is an axis and the argument of members")
+    orders = [
+        _ordered(function_of(each), list(merged["axes"]), each, argument)
+        for each in functions
+    ]
+    for each, order in zip(functions, orders, strict=True):
+        if order != orders[0]:
+            raise InputError(
+                f"{each} takes {', '.join(order)}, {functions[0]} {', '.join(orders[0])}: "
+                "functions of members must take the same arguments"
+            )
+    return orders[0]
 
 
 def load(
@@ -345,8 +392,30 @@ def _raised(wanted: Wanted, fault: Exception, point: FloatArray) -> str:
 
 
 def values_of(wanted: Wanted, x: FloatArray) -> FloatArray:
-    """The function at points (points, axes), shape (points, outputs); a job of workers."""
-    function = function_of(wanted.function)
+    """The function at points (points, axes), shape (points, stored outputs); a job of workers."""
+    members = wanted.members
+    if members is None:
+        return _values_of_one(wanted, function_of(wanted.function), x)
+    rows = []
+    for number, name in enumerate(members.names):
+        reference = wanted.function
+        if members.functions:
+            reference = members.functions[number]
+            function = function_of(reference)
+        else:
+            argument = {members.argument: members.values[number]}
+            function = functools.partial(function_of(wanted.function), **argument)
+        called = dataclasses.replace(wanted, function=f"{reference} (member {name})")
+        rows.append(_values_of_one(called, function, x))
+    together = np.array(rows)
+    beside = together[len(rows) - len(members.stored) :]
+    return np.concatenate([members.central(together), *beside], axis=1)
+
+
+def _values_of_one(
+    wanted: Wanted, function: Callable[..., Any], x: FloatArray
+) -> FloatArray:
+    """A function at points (points, axes), shape (points, outputs)."""
     marks = wanted.on_failure == "mark"
     names = tuple(output.name for output in wanted.outputs)
     # users' functions warn where they please; their values are checked here
@@ -451,7 +520,7 @@ class Kept:
     def load(self, number: int, piece: Piece) -> FloatArray:
         """Continue a piece; the values that it is waiting for, as far as known."""
         path = self.path(number)
-        none = np.empty((0, len(self.wanted.outputs)))
+        none = np.empty((0, len(self.wanted.stored)))
         if not path.exists():
             return none
         try:
@@ -509,7 +578,7 @@ def grow(
                 f"{wanted.target:g} is not reached in boxes of 2^-{MOST_HALVINGS} of the range; ask for a "
                 'larger target, or set on_failure = "mark" to refuse lookups there'
             ) from None
-        values = np.empty((0, len(wanted.outputs)))
+        values = np.empty((0, len(wanted.stored)))
     kept.save(number, piece, values)
 
 
@@ -529,24 +598,32 @@ def table_of(wanted: Wanted, pieces: list[Piece]) -> FunctionTable:
     cells = [box for box in boxes if box.axis == POLYNOMIAL]
     branches = np.array([(box.axis, box.child) for box in boxes], dtype=float)
     branches[branches[:, 0] == POLYNOMIAL, 1] = np.arange(len(cells))
-    sizes = [len(wanted.outputs) * math.prod(box.terms) for box in cells]
+    outputs = len(wanted.outputs)
+    sizes = [outputs * math.prod(box.terms) for box in cells]
+    series = [box.coefficients for box in cells if box.coefficients is not None]
+    bounds = np.array([box.error for box in cells])
     arrays = {
         "branches": branches,
         "middles": np.array([middle_of(boxes, box) for box in boxes]),
         "starts": np.cumsum([0, *sizes])[:-1].astype(float),
         "terms": np.array([box.terms for box in cells], dtype=float),
-        "coefficients": np.concatenate(
-            [box.coefficients.ravel() for box in cells if box.coefficients is not None]
-        ),
-        "errors": np.array([box.error for box in cells]),
+        "coefficients": np.concatenate([each[:outputs].ravel() for each in series]),
+        "errors": bounds[:, :outputs],
     }
     replayed = zip(*(piece.replayed for piece in pieces), strict=True)
     points, values = (np.concatenate(part) for part in replayed)
-    logs = np.array([output.transform == "log" for output in wanted.outputs])
+    logs = wanted.aim.is_exponential
+    exact = np.where(logs, np.exp(np.where(logs, values, 0.0)), values)
     arrays["conformance_x"] = _in_x(wanted, points)
-    arrays["conformance_exact"] = np.where(
-        logs, np.exp(np.where(logs, values, 0.0)), values
-    )
+    arrays["conformance_exact"] = exact[:, :outputs]
+    if wanted.members is not None:
+        arrays |= {
+            "member_coefficients": np.concatenate(
+                [each[outputs:].ravel() for each in series]
+            ),
+            "member_errors": bounds[:, outputs:],
+            "member_exact": exact[:, outputs:],
+        }
     errors = np.concatenate(
         [piece.errors for piece in pieces if piece.errors is not None]
     )
@@ -558,6 +635,7 @@ def _attributes(wanted: Wanted, errors: FloatArray, excess: int) -> dict[str, st
     """What the file says of the table."""
     answered = errors[np.isfinite(errors).all(axis=1)]
     names = [output.name for output in wanted.outputs]
+    members = () if wanted.members is None else wanted.members.stored
     if not len(answered):
         raise UnreachedError(f"{wanted.function} has no value at any held-out point")
     statistics = {
@@ -570,10 +648,16 @@ def _attributes(wanted: Wanted, errors: FloatArray, excess: int) -> dict[str, st
         "without_answer": len(errors) - len(answered),
         "above_bound": excess,
         **{
-            name: dict(zip(names, values.tolist(), strict=True))
+            name: dict(zip(names, values[: len(names)].tolist(), strict=True))
             for name, values in statistics.items()
         },
     }
+    if wanted.members is not None:
+        largest = statistics["largest_error"].reshape(-1, len(names))[1:].tolist()
+        certificate["largest_error_of_members"] = {
+            member: dict(zip(names, row, strict=True))
+            for member, row in zip(members, largest, strict=True)
+        }
     return {
         "title": wanted.title or f"Table of {wanted.function}",
         "function": wanted.function,
@@ -602,6 +686,22 @@ def _attributes(wanted: Wanted, errors: FloatArray, excess: int) -> dict[str, st
             "errors[cell, f] bounds the error: of the logarithm, relative to the larger of the "
             "value and least, or absolute, as the output's transform and error say"
         ),
+        **_attributes_of_members(wanted),
+    }
+
+
+def _attributes_of_members(wanted: Wanted) -> dict[str, str]:
+    """What the file says of its members."""
+    if wanted.members is None:
+        return {}
+    return {
+        "members": wanted.members.as_json,
+        "members_rule": f"{wanted.members.rule}: {RULES[wanted.members.rule]}",
+        "lookup_06": (
+            f"members {', '.join(wanted.members.stored)}: output f of member m, from 0, is that "
+            "sum with member_coefficients[starts[cell] M + (m F + f) n + ...] for M members and "
+            "F outputs, and its bound member_errors[cell, m F + f]"
+        ),
     }
 
 
@@ -616,10 +716,14 @@ def write(path: pathlib.Path, table: FunctionTable) -> None:
         "errors": (("cell", "output"), "bound on the error in each cell"),
         "conformance_x": (("conformance", "axis"), "held-out points to replay"),
         "conformance_exact": (("conformance", "output"), "what the function gives there"),
+        "member_coefficients": (("member_coefficient",), "those of the members"),
+        "member_errors": (("cell", "member_output"), "those of the members"),
+        "member_exact": (("conformance", "member_output"), "what the members give there"),
     }
     variables = {
         name: (dims, table.arrays[name], meaning, "1")
         for name, (dims, meaning) in over.items()
+        if name in table.arrays
     }
     write_own(path, variables, table.attributes, KIND, FORMAT)
 
@@ -774,7 +878,7 @@ def verified_errors(
     for start in range(0, count, ERROR_BLOCK):
         size = min(ERROR_BLOCK, count - start)
         x = _in_x(wanted, low + (high - low) * draws.random((size, low.size)))
-        exact = values_of(wanted, x)
+        exact = values_of(wanted, x)[:, : len(table.outputs)]
         found = table.lookup(*x.T)
         rows = [
             [

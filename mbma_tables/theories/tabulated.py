@@ -41,18 +41,23 @@ class Tabulated(Theory):
         The file. `error` of contacts is the table's bound; the scatter, and the reasons for
         which a result is not valid, are those of the theory that the table stands for. A
         table of a user's theory is never valid.
+    member : str, optional
+        Of a table with members, such as variants or replicas: the one to use in place of the
+        table's value.
 
     Raises
     ------
     TableFileError
         If the file is damaged or of another kind.
     InputError
-        If its axes or outputs are not those of `mbma_tables.theories.totals`.
+        If its axes or outputs are not those of `mbma_tables.theories.totals`, or it lacks
+        the member.
     OutOfRangeError
         For surfaces and gaps that the table does not cover.
     """
 
     table: str | os.PathLike[str]
+    member: str | None = None
 
     name = "tabulated"
 
@@ -70,11 +75,15 @@ class Tabulated(Theory):
     @shared_property
     def contents(self) -> FunctionTable:
         """The table."""
-        return read_once(self.table, read_function_table)
+        whole = read_once(self.table, read_function_table)
+        return whole if self.member is None else whole.member(self.member)
 
     @property
     def stands_for(self) -> Theory | None:
-        """The shipped theory whose totals these are; None for one of a user."""
+        """The shipped theory whose totals these are; None for one of a user, or a mean of several."""
+        members = self.contents.members
+        if members is not None and members.central_is_mean:
+            return None
         module, _, name = self.contents.attributes["function"].partition(":")
         is_shipped = module == TOTALS and name in THEORIES
         theory: Theory | None = shipped(name) if is_shipped else None
@@ -122,7 +131,7 @@ class Tabulated(Theory):
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force and area by the table, stiffness by its derivative."""
         numbers = self._arguments(surface, mean_separation)
-        found = self.contents.lookup(**numbers, derivatives=1)
+        found = self.contents.lookup(*numbers.values(), derivatives=1)
         gradient = np.asarray(surface.rms_gradient)
         last = self.contents.axes[-1].name
         length = -np.asarray(surface.h_max) if self.ends_at_h_max else surface.h_rms
@@ -225,4 +234,7 @@ class Tabulated(Theory):
         """The table's function and file."""
         attributes = self.contents.attributes
         digest = attributes["values_sha256"][:12]
-        return (f"table of {attributes['function']}, {self.table}, values {digest}",)
+        member = "" if self.member is None else f", member {self.member}"
+        return (
+            f"table of {attributes['function']}, {self.table}, values {digest}{member}",
+        )

@@ -208,3 +208,37 @@ def test_persson_is_tabulated_without_h_max(tmp_path):
         )
         exact = contact(face, mean_separation=[0.1, 0.5], theory="persson")
         assert np.allclose(found.pressure, exact.pressure, rtol=1e-4)
+
+
+def test_members_are_theories_and_a_mean_of_theories_is_none_of_them(tmp_path):
+    """A member is valid where its own theory is, and stands for that one alone."""
+    entries = {
+        "function": "mbma_tables.theories.totals:persson",
+        "axes": {
+            "hurst": {"low": 0.75, "high": 0.85},
+            "zeta_1": {"low": 150.0, "high": 250.0},
+            "gap": {"low": 0.5, "high": 1.5},
+        },
+        "outputs": LOGS,
+        "certificate_points": 200,
+        "pieces": 1,
+    }
+    members = {"functions": ["tabulated:half_of_persson"], "names": ["paper", "half"]}
+    for rule in ("envelope", "replicas"):
+        both = entries | {"members": members | {"rule": rule}}
+        make(wanted_of(both, target=1e-5), tmp_path / f"{rule}.nc")
+    found = {
+        (rule, member): Tabulated(tmp_path / f"{rule}.nc", member=member)
+        for rule in ("envelope", "replicas")
+        for member in (None, "paper", "half")
+    }
+    for (rule, member), theory in found.items():
+        shipped = member == "paper" or (member is None and rule == "envelope")
+        assert (theory.stands_for is not None) == shipped
+        answer = contact(FACE, mean_separation=0.2, theory=theory)
+        exact = contact(FACE, mean_separation=0.2, theory="persson")
+        factor = {"paper": 1.0, "half": 0.5, None: 1.0 if shipped else 0.75}[member]
+        assert answer.pressure / exact.pressure == pytest.approx(factor, rel=3e-5)
+        assert answer.valid <= shipped
+    with pytest.raises(InputError, match="no member 'quarter'"):
+        Tabulated(tmp_path / "envelope.nc", member="quarter")

@@ -1,0 +1,196 @@
+"""Members of tables of functions: variants and replicas, combined by the rules of LHAPDF, by numpy on the functions."""
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+import tabulated
+from click.testing import CliRunner
+
+from mbma_tables import InputError, TableFileError, open_table
+from mbma_tables.cli import main
+from mbma_tables.tables import make_function
+from mbma_tables.tables.make_function import make, merge, wanted_of
+
+AXES = {
+    "x": {"low": 0.1, "high": 10.0, "transform": "log"},
+    "y": {"low": 0.0, "high": 1.0},
+}
+OUTPUTS = {"u": {"unit": "N", "transform": "log"}, "v": {"error": "absolute"}}
+SEEDS = [1, 2, 3, 4, 5]
+BASE = {"axes": AXES, "outputs": OUTPUTS, "certificate_points": 400, "pieces": 4}
+
+
+def entries(rule="replicas", **changes):
+    return {
+        "function": "tabulated:replica",
+        **BASE,
+        "members": {"argument": "seed", "values": SEEDS, "rule": rule, **changes},
+    }
+
+
+@pytest.fixture(scope="module")
+def tables(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("members")
+    rules = ("replicas", "envelope", "symmetric_hessian", "hessian")
+    return {
+        rule: make(wanted_of(entries(rule), target=1e-6), folder / f"{rule}.nc")
+        for rule in rules
+    }
+
+
+def ends_by_hand(rule, f):
+    """Value and ends from the members of one point, in a loop, as the LHAPDF paper has them."""
+    if rule == "replicas":
+        mean = sum(f) / len(f)
+        deviation = (sum((one - mean) ** 2 for one in f) / (len(f) - 1)) ** 0.5
+        return mean, mean - deviation, mean + deviation
+    if rule == "envelope":
+        return f[0], min(f), max(f)
+    if rule == "symmetric_hessian":
+        root = sum((one - f[0]) ** 2 for one in f[1:]) ** 0.5
+        return f[0], f[0] - root, f[0] + root
+    up = down = 0.0
+    for plus, minus in zip(f[1::2], f[2::2], strict=True):
+        up += max(plus - f[0], minus - f[0], 0.0) ** 2
+        down += max(f[0] - plus, f[0] - minus, 0.0) ** 2
+    return f[0], f[0] - down**0.5, f[0] + up**0.5
+
+
+@pytest.mark.parametrize("rule", ["replicas", "envelope", "symmetric_hessian", "hessian"])
+def test_a_lookup_answers_with_its_spread(rule, tables):
+    table = tables[rule]
+    draws = np.random.default_rng(5)
+    x, y = draws.uniform(0.1, 10, 200), draws.random(200)
+    found = table.lookup(x, y, members=True)
+    spread = found.spread["u"]
+    members = [tabulated.replica(x, y, seed)[0] for seed in SEEDS]
+    for k in range(x.size):
+        value, low, high = ends_by_hand(rule, [member[k] for member in members])
+        assert abs(found["u"][k] - value) <= found.error["u"][k]
+        assert abs(spread.low[k] - low) <= spread.error[k]
+        assert abs(spread.high[k] - high) <= spread.error[k]
+    assert (spread.error <= 3e-5 * found["u"]).all()
+    np.testing.assert_allclose(spread.members, members, rtol=1e-6)
+    # an output that is the same in all
+    assert (np.abs(found.spread["v"].high - found["v"]) <= 1e-5).all()
+
+
+def test_a_member_is_a_table_of_its_own(tables, tmp_path):
+    for rule in ("replicas", "envelope"):
+        table = pickle.loads(pickle.dumps(tables[rule]))
+        for seed in SEEDS:
+            one = table.member(str(seed))
+            exact = tabulated.replica(2.0, 0.3, seed)[0]
+            found = one.lookup(2.0, 0.3)
+            assert abs(found["u"] - exact) <= found.error["u"]
+            assert one.replayed()[1] <= 1
+            assert one.members is None
+            make_function.write(tmp_path / "one.nc", _unhashed(one))
+            assert open_table(tmp_path / "one.nc").lookup(2.0, 0.3)["u"] == found["u"]
+        with pytest.raises(InputError, match="no member '6'"):
+            table.member("6")
+
+
+def _unhashed(table):
+    """As it is before it is written, without hashes."""
+    plain = {n: v for n, v in table.attributes.items() if not n.endswith("_sha256")}
+    plain = {n: v for n, v in plain.items() if n not in ("mbma_kind", "format_version")}
+    return type(table)(table.axes, table.outputs, table.arrays, plain)
+
+
+def test_members_that_are_functions(tmp_path):
+    members = {
+        "functions": ["tabulated:softer"],
+        "names": ["paper", "softer"],
+        "rule": "envelope",
+    }
+    wanted = wanted_of(
+        {"function": "tabulated:smooth", **BASE, "members": members}, target=1e-6
+    )
+    for part in (1, 2):
+        make(wanted, tmp_path / "t.nc", part=(part, 2))
+    table = merge(tmp_path / "t.nc", [tmp_path / "t.nc.pieces"])
+    u = table.lookup(3.0, 0.5, members=True).spread["u"]
+    exact = [f(3.0, 0.5)[0] for f in (tabulated.smooth, tabulated.softer)]
+    assert [u.low, u.high] == pytest.approx(sorted(exact), rel=1e-6)
+    assert list(u.members) == pytest.approx(exact, rel=1e-6)
+
+
+def test_labelled_spreads_and_grids(tables):
+    xr = pytest.importorskip("xarray")
+    table = tables["replicas"]
+    x = xr.DataArray([0.5, 1.0, 2.0], dims="load")
+    spread = table.lookup(x, 0.3, members=True).spread["u"]
+    assert spread.members.dims == ("member", "load")
+    assert list(spread.members["member"].values) == [*map(str, SEEDS)]
+    plain = table.lookup([0.5, 1.0, 2.0], 0.3, members=True).spread["u"]
+    assert np.array_equal(spread.low, plain.low)
+    assert spread.high.attrs["units"] == "N"
+    data = table.to_dataset(x=[0.5, 1.0], y=0.3)
+    assert float(data["u_high"][1, 0]) == float(plain.high[1])
+
+
+def test_commands_know_members(tables, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    make_function.write(tmp_path / "m.nc", _unhashed(tables["replicas"]))
+    shown = CliRunner().invoke(main, ["tables", "show", "m.nc"])
+    assert "members_rule: replicas: the mean of all members" in shown.output
+    checked = CliRunner().invoke(main, ["tables", "verify", "m.nc"])
+    assert checked.exit_code == 0
+    line = ["tables", "export", "python", "m.nc", "--member", "2", "--out", "code"]
+    done = CliRunner().invoke(main, line)
+    assert done.exit_code == 0, done.output
+    space = {}
+    exec(compile((tmp_path / "code/table.py").read_text(), "table.py", "exec"), space)
+    found = space["table"](2.0, 0.3)[0][0]
+    assert found == pytest.approx(tables["replicas"].member("2").lookup(2.0, 0.3)["u"])
+    sampled = CliRunner().invoke(
+        main, ["tables", "sample", "m.nc", "--at", "x=2", "--at", "y=0.3"]
+    )
+    assert "u_high" in sampled.output
+
+
+@pytest.mark.parametrize(
+    ("members", "message"),
+    [
+        ({"values": SEEDS}, "argument and values"),
+        ({"argument": "seed"}, "argument and values"),
+        (
+            {"argument": "seed", "values": SEEDS, "functions": ["tabulated:softer"]},
+            "or functions",
+        ),
+        ({"argument": "sed", "values": SEEDS}, "no argument 'sed'"),
+        ({"argument": "x", "values": SEEDS}, "an axis and the argument of members"),
+        ({"argument": "seed", "values": [1, 1]}, "different names"),
+        ({"argument": "seed", "values": [1, 2], "rule": "hessian"}, "an odd number"),
+        ({"argument": "seed", "values": [1, 2], "rule": "mean"}, "rule"),
+        ({"functions": ["tabulated:four"]}, "axes.z is missing"),
+    ],
+)
+def test_wrong_members_are_refused(members, message):
+    with pytest.raises(InputError, match=message):
+        wanted_of({"function": "tabulated:replica", **BASE, "members": members})
+
+
+def test_members_that_a_file_lacks_are_refused(tables, tmp_path):
+    table = _unhashed(tables["replicas"])
+    for name in ("member_coefficients", "member_errors", "member_exact"):
+        arrays = {n: a for n, a in table.arrays.items() if n != name}
+        make_function.write(
+            tmp_path / "bad.nc",
+            type(table)(table.axes, table.outputs, arrays, table.attributes),
+        )
+        with pytest.raises(TableFileError, match=name):
+            open_table(tmp_path / "bad.nc")
+    plain = tables["replicas"].member("1")
+    with pytest.raises(InputError, match="has no members"):
+        plain.lookup(1.0, 0.5, members=True)
+
+
+def test_a_failing_member_is_named(tmp_path):
+    wrong = entries(values=[1, 2, "three"])
+    with pytest.raises(InputError, match=r"\(member three\) raised"):
+        make(wanted_of(wrong, target=1e-3), tmp_path / "t.nc")
+    assert json.loads(wanted_of(wrong).as_json)["members"]["values"] == [1, 2, "three"]
