@@ -130,6 +130,7 @@ class Theory(abc.ABC):
     outside = "raise"
     rtol = 1e-8  # relative error that its laws aim at
     looks = LOOKS  # initial gaps of an inversion, for one surface
+    looks_of_batch = FEW_LOOKS  # and for each of a batch
     reached = 0.0  # relative amount by which a wanted value may exceed the largest
     bends_in_area = False  # whether at its `bends` only the area is not smooth
     takes_batches_of_spectra = True  # such as those of parts with a roll-off
@@ -244,6 +245,16 @@ class Theory(abc.ABC):
         h_max = np.asarray(surface.h_max, dtype=float)
         high = h_max if self.ends_at_h_max else np.full_like(h_max, np.inf)
         return np.zeros_like(h_max), high
+
+    def branch(
+        self, surface: AnySurface, quantity: str, wanted: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Mean separations [length] between which values on a batch are searched for.
+
+        By default those of `interval`; a theory may give a part that is known to reach
+        `wanted` and costs less to find.
+        """
+        return self.interval(surface, quantity)
 
     def domain(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] between which the theory answers.
@@ -394,7 +405,10 @@ class Theory(abc.ABC):
         self, surface: AnySurface, quantity: str, wanted: FloatArray
     ) -> tuple[FloatArray, NDArray[np.bool_]]:
         """`mean_separation_at`, and a mask where rounding of u excludes the value."""
-        first, last = self.interval(surface, quantity)
+        if surface.shape:
+            first, last = self.branch(surface, quantity, wanted)
+        else:
+            first, last = self.interval(surface, quantity)
         end = surface.h_max if self.ends_at_h_max else np.inf
         (goal, ends, low, high), shape = rows(wanted, end, first, last)
         if not self.ends_at_h_max:
@@ -412,7 +426,7 @@ class Theory(abc.ABC):
 
         # without a last contact from 12 h_rms on, which 2e-33 of Gaussian heights exceed
         farthest = last if self.ends_at_h_max else np.minimum(last, 12.0 * surface.h_rms)
-        count = FEW_LOOKS if surface.shape else self.looks
+        count = self.looks_of_batch if surface.shape else self.looks
         samples, exact = inversion.sampled(curve, first, farthest, count, shape)
 
         # goals beyond the value at the smallest gap, whose answer is that gap or an error

@@ -82,6 +82,7 @@ class Mbma(Theory):
     outside: str = "raise"
 
     name = "mbma"
+    looks_of_batch = 4  # a look costs as much as a step of Newton's method
     takes_batches_of_spectra = False  # sums of islands are one surface at a time
     advice = "theory='calibrated' for stiffness or separation"
 
@@ -234,6 +235,46 @@ class Mbma(Theory):
         else:
             check_band(surface, self.variant)
         return self._maximum(surface, quantity, lowest), high
+
+    def branch(
+        self, surface: AnySurface, quantity: str, wanted: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """The part of the interval in which force and area rise with compression, if it suffices.
+
+        In batches, whose islands are summed gap by gap, the search for their maximum costs
+        more than the rest of an inversion.
+        """
+        if not isinstance(surface, Surface):
+            return self.interval(surface, quantity)
+        check_band(surface, self.variant)
+        high = np.asarray(surface.h_max, dtype=float)
+        first = np.asarray(self._rising_from(surface))
+        separation = 2 * first - high
+        answer = self._scanned.totals(surface, separation)
+        reached = answer.pressure if quantity == "pressure" else answer.area
+        shape = np.broadcast_shapes(wanted.shape, surface.shape)
+        is_beyond = np.broadcast_to(~(wanted <= reached), shape)
+        if not is_beyond.any():
+            return first, high
+        places = np.flatnonzero(is_beyond)
+        deeper, _ = self.interval(select(surface, shape, places), quantity)
+        first = np.array(np.broadcast_to(first, shape))
+        first[is_beyond] = deeper
+        return first, high
+
+    def _rising_from(self, surface: Surface) -> FloatArray:
+        """Mean separation [length] from which on force and area fall for sure.
+
+        Every island has fewer of its kind at a larger separation d where its height z' = d +
+        delta - h_d (41) is positive, thus from the largest h_d - delta on. Up to the floor of
+        zeta_d, h_d is a multiple of delta; it is constant from there on.
+        """
+        h_rms_over_s = np.sqrt(-np.expm1(-2 * surface.hurst * np.log(surface.zeta_1)))
+        multiple = 4 / 3 * self.variant.beta / h_rms_over_s
+        at_floor, _ = kinks(surface.hurst, surface.zeta_1, self.variant)
+        separation = np.maximum(multiple - 1, 0) * at_floor * surface.h_rms
+        h_max = np.asarray(surface.h_max)
+        return np.asarray((h_max + np.minimum(separation, h_max)) / 2)
 
     def domain(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
         """All mean separations from 0: answers are beyond the largest force, too.

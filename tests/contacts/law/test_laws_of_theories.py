@@ -239,6 +239,40 @@ def test_mbma_ends_where_its_force_turns():
     )
 
 
+@pytest.mark.parametrize("variant", ["reported", "printed", "fitted"])
+def test_mbma_rises_with_compression_where_it_is_not_searched_for_a_maximum(variant):
+    rng = np.random.default_rng(5)
+    hurst = rng.uniform(0.05, 1.0, 60)
+    zeta_1 = 10 ** rng.uniform(0.8, 4, 60)
+    h_max = rng.uniform(1.0, 5.5, 60)
+    batch = Surface(hurst, 1.0, zeta_1, 1.0, h_max)
+    theory = Mbma(variant=variant, outside="nan")
+    wanted = np.full(60, 1e-9)
+    first, last = theory.branch(batch, "pressure", wanted)
+    gaps = last + (first - last) * np.linspace(0.01, 1, 40)[:, None]
+    totals = theory.totals(batch, 2 * gaps - h_max)
+    assert (np.diff(totals.pressure, axis=0) > 0).all()
+    assert (np.diff(totals.area, axis=0) > 0).all()
+    # the maxima, which 200 compressions bracket, are all deeper
+    assert (first >= theory.interval(batch)[0]).all()
+
+
+def test_mbma_is_searched_for_a_maximum_only_for_what_needs_it():
+    # pressures near the maximum of the first one and far below those of the others
+    batch = Surface([0.3, 0.7, 0.9], 1.0, [1000.0, 60.0, 216.0], 1.0, 3.0)
+    theory = Mbma()
+    deepest, _ = theory.interval(batch)
+    largest = theory.answer(batch, deepest).pressure
+    wanted = largest * np.array([0.999, 0.01, 0.01])
+    first, _ = theory.branch(batch, "pressure", wanted)
+    assert first[0] == pytest.approx(deepest[0], rel=1e-12)
+    assert (first[1:] == 1.5).all()
+    u = theory.mean_separation_at(batch, "pressure", wanted)
+    assert theory.answer(batch, u).pressure == pytest.approx(wanted, rel=1e-9)
+    with pytest.raises(OutOfRangeError, match="at most what theory 'mbma' reaches"):
+        theory.mean_separation_at(batch, "pressure", largest * np.array([1.01, 0.01, 1]))
+
+
 def test_a_users_own_object_is_a_theory():
     theory = resolve(Springs())
     u = np.array([0.5, 2.0])
