@@ -42,6 +42,7 @@ OUTSIDE = ("raise", "nan", "nearest", "periodic")  # policies of an axis
 IN_CORE = {"raise": 0, "nan": 0, "nearest": 1, "periodic": 2}  # as in mbma.h
 BLOCK = 1 << 14  # points between two checks for Ctrl-C
 STEPS = 80  # of an inverse
+NUMBERS = ("axis_numbers", "output_numbers")
 LANES = 4  # `MBMA_LANES` of mbma.h
 ROUNDING = 4e-15
 
@@ -157,6 +158,15 @@ class FunctionTable:
         """Its members and their rule; None for a table without any."""
         text = self.attributes.get("members")
         return None if text is None else Members.from_json(json.loads(text))
+
+    def numbers(self) -> dict[str, FloatArray]:
+        """Axes and outputs as numbers, for readers in languages without JSON."""
+        rows = [
+            (output.transform == "log", output.error == "relative", output.least)
+            for output in self.outputs
+        ]
+        axes = self._core[0].reshape(len(self.axes), -1)
+        return {"axis_numbers": axes, "output_numbers": np.array(rows, dtype=float)}
 
     def _require_members(self) -> Members:
         if self.members is None:
@@ -693,6 +703,8 @@ def table_in(dataset: netCDF4.Dataset) -> FunctionTable:
     try:
         axes = tuple(FunctionAxis(**entry) for entry in json.loads(attributes["axes"]))
         outputs = tuple(Output(**entry) for entry in json.loads(attributes["outputs"]))
+        for name in NUMBERS:  # what the attributes say, for other languages
+            values.pop(name, None)
         points = values["conformance_x"], values["conformance_exact"]
         shapes = [(len(points[0]), len(axes)), (len(points[0]), len(outputs))]
         if [array.shape for array in points] != shapes:

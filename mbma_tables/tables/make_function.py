@@ -719,11 +719,21 @@ def write(path: pathlib.Path, table: FunctionTable) -> None:
         "member_coefficients": (("member_coefficient",), "those of the members"),
         "member_errors": (("cell", "member_output"), "those of the members"),
         "member_exact": (("conformance", "member_output"), "what the members give there"),
+        "axis_numbers": (
+            ("axis", "of_axis"),
+            "low, high, offset, both ends as coordinates, 1 for a logarithm, outside: 0 refused, "
+            "1 nearest, 2 periodic",
+        ),
+        "output_numbers": (
+            ("output", "of_output"),
+            "1 for an exponential, 1 for a relative error, least",
+        ),
     }
+    arrays = {**table.arrays, **table.numbers()}
     variables = {
-        name: (dims, table.arrays[name], meaning, "1")
+        name: (dims, arrays[name], meaning, "1")
         for name, (dims, meaning) in over.items()
-        if name in table.arrays
+        if name in arrays
     }
     write_own(path, variables, table.attributes, KIND, FORMAT)
 
