@@ -221,6 +221,13 @@ _joint_options = option_group(
     default="",
     help="Columns that are no arguments, to be written as they are.",
 )
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    default=1,
+    show_default=True,
+    help="Processes that compute rows.",
+)
 def batch_command(
     designs: Path,
     out: Path,
@@ -228,6 +235,7 @@ def batch_command(
     settings: tuple[str, ...],
     quantities: str | None,
     keep: str,
+    workers: int,
 ) -> None:
     """Quantities of a joint for each row of the table DESIGNS (.csv, .parquet, .nc).
 
@@ -247,6 +255,7 @@ def batch_command(
         quantities=None if quantities is None else quantities.split(","),
         keep=[name for name in keep.split(",") if name],
         path="joint" if file is None else file,
+        workers=workers,
     )
     echo(
         f"mbma batch: {found.rows} rows, {found.refused} of them refused, "

@@ -1,5 +1,6 @@
 """Jobs, here or in processes of this machine."""
 
+import collections
 import concurrent.futures
 import contextlib
 import itertools
@@ -7,12 +8,13 @@ import multiprocessing
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from mbma_tables.common.arguments import needed
 
-Crew = Callable[[Callable[..., Any], Sequence[tuple[Any, ...]]], Iterator[Any]]
+Crew = Callable[[Callable[..., Any], Iterable[tuple[Any, ...]]], Iterator[Any]]
+AHEAD = 2  # jobs a worker that are under way, or done and not yet asked for
 
 
 def end_with(parent: int) -> None:
@@ -50,7 +52,27 @@ def crew(workers: int = 1, scheduler: str | None = None) -> Iterator[Crew]:
     with concurrent.futures.ProcessPoolExecutor(
         workers, start, end_with, (os.getpid(),)
     ) as pool:
-        yield lambda work, jobs: pool.map(work, *zip(*jobs, strict=True))
+        yield lambda work, jobs: _in_order(pool, work, jobs, AHEAD * workers)
+
+
+def _in_order(
+    pool: concurrent.futures.Executor,
+    work: Callable[..., Any],
+    jobs: Iterable[tuple[Any, ...]],
+    most: int,
+) -> Iterator[Any]:
+    """Results in the order of the jobs, which are taken as they are needed: memory stays flat."""
+    running: collections.deque[concurrent.futures.Future[Any]] = collections.deque()
+    try:
+        for job in jobs:
+            running.append(pool.submit(work, *job))
+            if len(running) > most:
+                yield running.popleft().result()
+        while running:
+            yield running.popleft().result()
+    finally:
+        for unfinished in running:
+            unfinished.cancel()
 
 
 def results(

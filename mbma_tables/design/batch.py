@@ -8,14 +8,14 @@ import itertools
 import os
 import pathlib
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mbma_tables.bodies.bodies import Bodies, names_metals
 from mbma_tables.bodies.materials import Metal
-from mbma_tables.common.arguments import FloatArray, nearest
+from mbma_tables.common.arguments import FloatArray, nearest, whole_number_in
 from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.common.progress import doing, shown
 from mbma_tables.common.toml_files import set_entry, value_of
@@ -28,13 +28,17 @@ from mbma_tables.common.units import (
     read,
     unit_of,
 )
+from mbma_tables.common.workers import crew
 from mbma_tables.contacts.quantities import registry
 from mbma_tables.contacts.quantities.interface import Gas
 from mbma_tables.contacts.result import Contact
 from mbma_tables.design.joint import FACES, PLAIN_STRESS, Joint
 from mbma_tables.design.row_files import (
     Chunk,
+    Rows,
     Source,
+    csv_lines,
+    is_csv,
     open_writer,
     opened,
     require_writable,
@@ -47,6 +51,7 @@ REASON = "reason"
 VALID = "valid"
 # units of arguments that are neither lengths nor stresses
 OTHER_UNITS = {"force": "N", "conductivity": "W/(m K)", "temperature": "K"}
+MOST_WORKERS = 256
 # of a row in which something is missing
 EMPTY = "{name} is empty"
 
@@ -132,7 +137,8 @@ class Column:
         """Numbers in these units, NaN where there are none, and why."""
         is_plain = self.needs_unit and not self.unit
         try:
-            numbers = np.asarray(cells).astype(float)
+            given = cells if isinstance(cells, np.ndarray) else list(map(float, cells))
+            numbers = np.asarray(given, dtype=float)
         except ValueError:
             numbers = np.full(len(cells), np.nan)
         if np.isfinite(numbers).all() and not is_plain:
@@ -364,10 +370,12 @@ def answered(
     for row, fault in faults.items():
         answers.reasons[row] = fault
     groups: dict[tuple[str, ...], list[int]] = {}
-    for row in range(chunk.rows):
-        if row not in faults:
-            key = tuple(chunk.columns[column.name][row].strip() for column in texts)
-            groups.setdefault(key, []).append(row)
+    sound = [row for row in range(chunk.rows) if row not in faults]
+    if not texts:
+        groups[()] = sound
+    for row in sound if texts else ():
+        key = tuple(chunk.columns[column.name][row].strip() for column in texts)
+        groups.setdefault(key, []).append(row)
     for key, members in groups.items():
         given = {c.name: _name_of(cell) for c, cell in zip(texts, key, strict=True)}
         common = _with(designs.common, given)
@@ -461,6 +469,7 @@ def batch(
     quantities: Sequence[str] | None = None,
     keep: Sequence[str] = (),
     path: str | os.PathLike[str] = "joint",
+    workers: int = 1,
 ) -> Summary:
     r"""Compute a joint for each row of a table, and write the rows with every quantity beside them.
 
@@ -483,6 +492,9 @@ def batch(
         Columns that are no arguments, to be written as they are.
     path : path-like
         File of the common entries, for paths of maps.
+    workers : int
+        Processes that compute rows; their order and numbers do not depend on it. A script
+        that asks for more than one needs ``if __name__ == "__main__":`` around its calls.
 
     Returns
     -------
@@ -514,6 +526,7 @@ def batch(
     """
     target = pathlib.Path(out)
     require_writable(target)
+    whole_number_in("workers", workers, 1, MOST_WORKERS)
     with opened(pathlib.Path(designs)) as source, shown("rows"):
         table = designs_of(source, common or {}, keep, pathlib.Path(path))
         names = names_of_results(table.require_load(), quantities)
@@ -521,37 +534,78 @@ def batch(
         if clashes:
             listed = ", ".join(clashes)
             raise InputError(f"columns are named as those of answers: {listed}")
-        return _written(source, table, names, target)
+        return _written(source, table, names, target, workers)
+
+
+@dataclasses.dataclass(frozen=True)
+class Task:
+    """What is done with each chunk of a table, here or in another process."""
+
+    designs: Designs
+    names: Sequence[str]  # of the quantities
+    units: Mapping[str, str]  # of all columns, in the order in which they are written
+    as_text: bool  # whether rows are lines of CSV
+
+    def __call__(self, chunk: Chunk) -> Done:
+        """Compute a chunk."""
+        units = {name: self.units[name] for name in self.names}
+        return self.done(chunk, *answered(self.designs, chunk, self.names, units))
+
+    def done(
+        self, chunk: Chunk, answers: Answers, numbers: Mapping[str, FloatArray]
+    ) -> Done:
+        """A chunk with its answers, as it is written."""
+        columns = dict(chunk.columns)
+        if not self.as_text:
+            columns |= {
+                name: each / _factor(self.designs, name) for name, each in numbers.items()
+            }
+        columns |= answers.values
+        columns |= {VALID: answers.valid, REASON: answers.reasons}
+        rows = csv_lines(columns, list(self.units)) if self.as_text else columns
+        refused = answers.valid.count("")
+        not_valid = answers.valid.count("no")
+        return Done(rows, chunk.rows, refused, not_valid, chunk.done)
+
+
+class Done(NamedTuple):
+    """A chunk with its answers, as it is written, and how many rows it had."""
+
+    written: Rows
+    rows: int
+    refused: int
+    not_valid: int
+    share: float  # of the table up to its end
 
 
 def _written(
-    source: Source, designs: Designs, names: Sequence[str], target: pathlib.Path
+    source: Source,
+    designs: Designs,
+    names: Sequence[str],
+    target: pathlib.Path,
+    workers: int,
 ) -> Summary:
-    """Compute and write chunk by chunk."""
-    rows = refused = not_valid = 0
-    chunks = _computed(source, designs, names)
-    first = next(chunks, None)
+    """Compute and write chunk by chunk; quantities have the units of the first one."""
+    first = next(source.chunks, None)
     if first is None:
         raise InputError("the table has no rows")
-    answers = first[1]
+    of_first: dict[str, str] = {}
+    answers, numbers = answered(designs, first, names, of_first)
     units = dict(source.units)
     for name in names:
-        units[name] = answers.units.get(name) or registry.get(name).unit_in(designs.units)
-    texts = dict.fromkeys((VALID, REASON), "")
-    with open_writer(target, units | texts) as write:
-        for chunk, answers, numbers in itertools.chain([first], chunks):
-            columns = dict(chunk.columns)
-            if target.suffix != ".csv" and str(target) != "-":
-                columns |= {
-                    name: each / _factor(designs, name) for name, each in numbers.items()
-                }
-            columns |= answers.values
-            columns |= {VALID: answers.valid, REASON: answers.reasons}
-            write(columns)
-            rows += chunk.rows
-            refused += answers.valid.count("")
-            not_valid += answers.valid.count("no")
-            doing(f"{rows:,} rows, {chunk.done:.0%} of the table")
+        units[name] = of_first.get(name) or registry.get(name).unit_in(designs.units)
+    units |= dict.fromkeys((VALID, REASON), "")
+    task = Task(designs, names, units, is_csv(target))
+
+    rows = refused = not_valid = 0
+    with open_writer(target, units) as write, crew(workers) as run:
+        others = run(task, ((chunk,) for chunk in source.chunks))
+        for done in itertools.chain([task.done(first, answers, numbers)], others):
+            write(done.written)
+            rows += done.rows
+            refused += done.refused
+            not_valid += done.not_valid
+            doing(f"{rows:,} rows, {done.share:.0%} of the table")
     return Summary(rows, refused, not_valid)
 
 
@@ -559,13 +613,3 @@ def _factor(designs: Designs, name: str) -> float:
     """That of a column from its own unit to those of the designs."""
     column = next(each for each in designs.columns if each.name == name)
     return column.factor_to(designs.units)
-
-
-def _computed(
-    source: Source, designs: Designs, names: Sequence[str]
-) -> Iterator[tuple[Chunk, Answers, dict[str, FloatArray]]]:
-    """The chunks of a source with their answers; quantities have the units of the first ones."""
-    units: dict[str, str] = {}
-    for chunk in source.chunks:
-        answers, numbers = answered(designs, chunk, names, units)
-        yield chunk, answers, numbers

@@ -19,6 +19,7 @@ from mbma_tables.common.files import drafted
 from mbma_tables.common.netcdf import HDF5_LOCK
 
 CHUNK = 20_000  # rows that are in memory at a time
+_SPECIAL = re.compile('[,"\r\n]')  # signs that end cells or lines
 _HEADER = re.compile(r"\s*(.*?)\s*(?:\[\s*(.*?)\s*\])?\s*")
 
 
@@ -44,7 +45,9 @@ class Source(NamedTuple):
     chunks: Iterator[Chunk]
 
 
-Writer = Callable[[Mapping[str, Any]], None]
+# what a file takes of a chunk: columns, or the lines of CSV
+Rows = Mapping[str, Any] | str
+Writer = Callable[[Rows], None]
 
 
 def header_of(name: str, unit: str) -> str:
@@ -194,13 +197,13 @@ def _netcdf_source(path: pathlib.Path, data: Any) -> Source:
 
 @contextlib.contextmanager
 def open_writer(path: pathlib.Path, units: Mapping[str, str]) -> Iterator[Writer]:
-    """What writes columns, chunk by chunk, to a file that appears when all are written."""
+    """What writes rows, chunk by chunk, to a file that appears when all are written."""
     headers = {name: header_of(name, unit) for name, unit in units.items()}
     if str(path) == "-":
         yield _csv_writer(sys.stdout, headers)
         return
     with drafted(path) as draft:
-        if path.suffix == ".csv":
+        if is_csv(path):
             with open(draft, "x", encoding="utf-8", newline="") as stream:
                 yield _csv_writer(stream, headers)
         elif path.suffix == ".parquet":
@@ -219,24 +222,49 @@ def require_writable(path: pathlib.Path) -> None:
         needed("pyarrow.parquet")
 
 
-def _csv_writer(stream: TextIO, headers: Mapping[str, str]) -> Writer:
-    rows = csv.writer(stream, lineterminator="\n")
-    rows.writerow(headers.values())
+def is_csv(path: pathlib.Path) -> bool:
+    """Whether rows are written to it as lines of text."""
+    return path.suffix == ".csv" or str(path) == "-"
 
-    def write(columns: Mapping[str, Any]) -> None:
-        rows.writerows(zip(*(_written(columns[name]) for name in headers), strict=True))
+
+def _csv_writer(stream: TextIO, headers: Mapping[str, str]) -> Writer:
+    stream.write(",".join(_quoted(header) for header in headers.values()) + "\n")
+
+    def write(rows: Rows) -> None:
+        stream.write(rows if isinstance(rows, str) else csv_lines(rows, list(headers)))
 
     return write
 
 
-def _written(column: Any) -> Sequence[Any]:
+def csv_lines(columns: Mapping[str, Any], names: Sequence[str]) -> str:
+    """The lines of some columns in this order."""
+    cells = [_written(columns[name]) for name in names]
+    lines = map(",".join, zip(*cells, strict=True))
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _written(column: Any) -> Sequence[str]:
     """Cells of a column: numbers with all their digits, empty where there is none."""
     if not (isinstance(column, np.ndarray) and column.dtype.kind == "f"):
-        return list(column)
-    entries: list[Any] = column.tolist()
-    for k in np.flatnonzero(np.isnan(column)).tolist():
+        texts = list(map(str, column))
+        if not _SPECIAL.search("".join(texts)):
+            return texts
+        quoted = {text: _quoted(text) for text in set(texts)}
+        return [quoted[text] for text in texts]
+    missing = np.isnan(column)
+    if missing.all():
+        return [""] * column.size
+    entries = list(map(repr, column.tolist()))
+    for k in np.flatnonzero(missing).tolist():
         entries[k] = ""
     return entries
+
+
+def _quoted(text: str) -> str:
+    """A cell as it is, or in quotes where it has signs that end cells or lines."""
+    if _SPECIAL.search(text):
+        return '"' + text.replace('"', '""') + '"'
+    return text
 
 
 @contextlib.contextmanager
@@ -244,7 +272,8 @@ def _parquet_writer(draft: pathlib.Path, headers: Mapping[str, str]) -> Iterator
     pyarrow, parquet = (needed(module) for module in ("pyarrow", "pyarrow.parquet"))
     made: list[Any] = []
 
-    def write(columns: Mapping[str, Any]) -> None:
+    def write(columns: Rows) -> None:
+        assert not isinstance(columns, str)
         table = pyarrow.table({header: columns[name] for name, header in headers.items()})
         if not made:
             made.append(parquet.ParquetWriter(draft, table.schema))
@@ -266,8 +295,9 @@ def _netcdf_writer(draft: pathlib.Path, units: Mapping[str, str]) -> Iterator[Wr
         data.createDimension("row", None)
     written = 0
 
-    def write(columns: Mapping[str, Any]) -> None:
+    def write(columns: Rows) -> None:
         nonlocal written
+        assert not isinstance(columns, str)
         with HDF5_LOCK:
             for name, unit in units.items():
                 column = columns[name]

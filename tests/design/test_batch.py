@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from helpers import refused
 
-from mbma_tables import Bodies, Joint, Surface
+from mbma_tables import Bodies, InputError, Joint, Surface
 from mbma_tables.design import row_files
 from mbma_tables.design.batch import batch
 
@@ -157,6 +157,47 @@ def test_no_row_is_lost_between_chunks(tmp_path, monkeypatch, rows):
         np.testing.assert_allclose(_column(other, "part_a.Rq", "um"), heights)
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+def test_processes_write_the_rows_of_one_in_their_order(
+    table, tmp_path, monkeypatch, suffix
+):
+    monkeypatch.setattr(row_files, "CHUNK", 2)
+    files = [tmp_path / f"{workers} workers{suffix}" for workers in (1, 3)]
+    found = [
+        batch(table, out, common=COMMON, keep=["design"], workers=workers)
+        for out, workers in zip(files, (1, 3), strict=True)
+    ]
+    assert found[0] == found[1]
+    assert found[0].refused == len(REFUSED)
+    if suffix == ".csv":
+        assert files[0].read_bytes() == files[1].read_bytes()
+        return
+    with netCDF4.Dataset(files[0]) as one, netCDF4.Dataset(files[1]) as other:
+        assert list(one.variables) == list(other.variables)
+        for name in one.variables:
+            np.testing.assert_array_equal(one[name][:], other[name][:])
+
+
+@pytest.mark.parametrize("workers", [0, 1.5, "two", 1000])
+def test_a_number_of_processes_is_checked_before_any_row(table, tmp_path, workers):
+    with pytest.raises(InputError, match="workers must be a whole number"):
+        batch(table, tmp_path / "out.csv", common=COMMON, workers=workers)
+
+
+def test_cells_with_signs_of_csv_are_read_as_they_were_written(tmp_path):
+    """Python's own reader of CSV is the other side."""
+    texts = ["plain", 'a "quoted" word', "two\nlines", "one,two", "", "\r"]
+    numbers = np.array([1.5, np.nan, -0.0, 1e-300, np.inf, 0.1 + 0.2])
+    path = tmp_path / "rows.csv"
+    columns = {"text": texts, "number, with a comma": numbers}
+    with row_files.open_writer(path, {"text": "", "number, with a comma": "um"}) as write:
+        write(columns)
+    rows = rows_of(path)
+    assert [row["text"] for row in rows] == texts
+    again = [row["number, with a comma [um]"] for row in rows]
+    assert again == ["1.5", "", "-0.0", "1e-300", "inf", repr(0.1 + 0.2)]
+
+
 def _column(path, name, unit=""):
     if path.suffix == ".nc":
         with netCDF4.Dataset(path) as data:
@@ -297,7 +338,8 @@ MEMORY = """
 import json, pathlib, re, sys
 from mbma_tables.design.batch import batch
 common = json.loads(sys.argv[2])
-batch(sys.argv[1], sys.argv[1] + ".csv", common=common, quantities=["area"])
+options = {"common": common, "quantities": ["area"], "workers": int(sys.argv[3])}
+batch(sys.argv[1], sys.argv[1] + ".csv", **options)
 status = pathlib.Path("/proc/self/status").read_text()
 print(re.search(r"VmHWM:\\s*(\\d+) kB", status)[1])
 """
@@ -305,7 +347,8 @@ print(re.search(r"VmHWM:\\s*(\\d+) kB", status)[1])
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_memory_does_not_grow_with_the_table(tmp_path):
+@pytest.mark.parametrize("workers", [1, 2])
+def test_memory_does_not_grow_with_the_table(tmp_path, workers):
     common = {
         "part_a": BAND | {"longest": "0.5 mm"},
         "bodies": "copper C11000 hard",
@@ -318,7 +361,7 @@ def test_memory_does_not_grow_with_the_table(tmp_path):
         heights = np.linspace(0.2, 0.8, rows).tolist()
         path.write_text("part_a.Rq [um]\n" + "\n".join(map(repr, heights)) + "\n")
         ran = subprocess.run(
-            [sys.executable, "-c", MEMORY, str(path), json.dumps(common)],
+            [sys.executable, "-c", MEMORY, str(path), json.dumps(common), str(workers)],
             capture_output=True,
             text=True,
             check=True,

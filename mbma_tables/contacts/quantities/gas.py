@@ -34,7 +34,9 @@ FIRST = 1e-5  # A/A0 below which gaps go over to those before contact, without a
 TAIL = 8.0
 NODES = 96
 FULLEST = 1 - 1e-12
-BLOCK = 1 << 12  # contacts between two checks for Ctrl-C, each with NODES gaps
+# contacts that are computed at a time, each with NODES gaps, which fit into the caches of a
+# processor
+BLOCK = 1 << 9
 # held-out simulations of gaps: jumps [h_rms], root mean square errors, smallest and
 # largest A/A0 (docs/joints.md, "Gas in the gaps", by `python -m generate gas`)
 JUMPS = (0.03, 0.1, 0.3, 1.0, 3.0)
