@@ -479,11 +479,15 @@ def _of_code(
     """Arguments of a law as code; comments name what is left out of a joint."""
     language = LANGUAGES.get(target)
     notes: list[str] = []
-    if language and language.frictionless and subject.friction is not None:
-        notes.append(
-            f"the joint's friction, {subject.friction:g}, is left out: the faces slide freely"
-        )
     arguments = _stiffness_before_slip(subject, notes)
+    if language and language.friction and subject.friction is not None:
+        if "kappa" in arguments or not subject.is_joint:
+            arguments["friction"] = subject.friction
+        else:
+            notes.append(
+                f"the joint's friction, {subject.friction:g}, is left out: the faces slide "
+                "freely"
+            )
     arguments |= _heat_of_code(subject, target, units, heat, notes)
     return {**arguments, "notes": tuple(notes)}
 

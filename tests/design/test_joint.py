@@ -594,19 +594,25 @@ def test_gases_against_kinetic_theory(gas, molar_mass):
     assert data.accommodation == pytest.approx(expected, rel=0.25)
 
 
-def test_a_subroutine_without_friction_says_so():
+def test_a_subroutine_has_the_friction_of_the_joint_or_says_that_it_has_none():
     face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
     given = {
         "bodies": "copper C11000 hard",
         "nominal_area": "4 cm^2",
         "theory": "calibrated",
     }
-    note = "the joint's friction, 0.2, is left out: the faces slide freely"
+    without = "WITHOUT FRICTION: the faces slide freely."
     for friction in (0.2, None):
         text = Joint(face, friction=friction, **given).export("abaqus-uinter", heat=False)
-        assert (note in " ".join(text.replace("\n *", " ").split())) == (
-            friction is not None
-        )
+        words = " ".join(text.replace("\n *", " ").split())
+        assert ("_FRICTION = 0.2;" in words) == (friction is not None)
+        assert (without in words) == (friction is None)
+    # without Poisson's ratios there is no stiffness before slip
+    given["bodies"] = "120 GPa"
+    text = Joint(face, friction=0.2, **given).export("abaqus-uinter", heat=False)
+    words = " ".join(text.replace("\n *", " ").split())
+    assert "the joint's friction, 0.2, is left out: the faces slide freely" in words
+    assert without in words
 
 
 def closures(joint):

@@ -593,6 +593,193 @@ def test_abaqus_uinter(name, tmp_path):
     assert (p[out][:3] == 0).all()
 
 
+# what Abaqus does with a surface interaction: it hands over the stress and the energies of
+# the beginning of an increment in each iteration, and keeps those of the last one
+INCREMENTS = """program increments
+  use, intrinsic :: iso_fortran_env, only: dp => real64
+  implicit none
+  integer, parameter :: ndir = NDIR, nstatv = 1, npred = 1, nprops = 1, mcrd = 3
+  real(dp), parameter :: by = 1e-6_dp, spring = SPRING
+  real(dp) :: begun(ndir), stress(ndir), tangent(ndir, ndir), numeric(ndir, ndir), place(ndir), moved(ndir)
+  real(dp) :: wanted(ndir), rest(ndir), energies(2), kept(2), one(ndir), other(ndir), nothing(ndir, ndir)
+  real(dp) :: residual(40)
+  integer :: status, k, rounds
+  character(len=8) :: kind
+  begun = 0
+  place = 0
+  energies = 0
+  open (10, file="steps.txt")
+  open (11, file="values.txt")
+  do
+    read (10, *, iostat=status) kind, wanted
+    if (status /= 0) exit
+    moved = 0
+    residual = 0
+    if (kind == "place") then
+      moved = wanted - place
+      call ask(moved, stress, tangent, kept)
+      rounds = 0
+    else
+      do rounds = 1, 40
+        call ask(moved, stress, tangent, kept)
+        rest = spring * (wanted - place - moved) - stress
+        residual(rounds) = maxval(abs(rest))
+        if (residual(rounds) < 1e-13_dp * spring * maxval(abs(wanted))) exit
+        if (kind == "symmetry") tangent = (tangent + transpose(tangent)) / 2
+        do k = 1, ndir
+          tangent(k, k) = tangent(k, k) + spring
+        end do
+        moved = moved + solved(tangent, rest)
+      end do
+      call ask(moved, stress, tangent, kept)
+    end if
+    do k = 1, ndir
+      moved(k) = moved(k) + by * 1e-3_dp
+      call ask(moved, one, nothing, rest)
+      moved(k) = moved(k) - 2e-3_dp * by
+      call ask(moved, other, nothing, rest)
+      moved(k) = moved(k) + by * 1e-3_dp
+      numeric(:, k) = (one - other) / (2e-3_dp * by)
+    end do
+    begun = stress
+    energies = kept
+    place = place + moved
+    write (11, "(*(es25.16e3))") place, stress, tangent, numeric, kept, real(rounds, dp), residual(1:8)
+  end do
+contains
+  subroutine ask(moved, stress, tangent, kept)
+    real(dp), intent(in) :: moved(ndir)
+    real(dp), intent(out) :: stress(ndir), tangent(ndir, ndir), kept(:)
+    real(dp) :: flux(2), amki(ndir, ndir), amski(ndir, ndir), ddfddt(2, 2), ddsddt(ndir, 2), ddfddr(2, ndir), &
+      statev(nstatv), sed, sfd, spd, svd, scd, pnewdt, dtemp(2), dpred(2, npred), props(nprops), &
+      alocaldir(3, 3), drot(2, 2), temp(2), predef(2, npred), time(2), coords(3)
+    integer :: lopenclose, lstate, lsdi
+    character(len=80) :: ciname, slname, msname
+    ciname = "ROAD"
+    temp = 0
+    stress = begun
+    sed = energies(1)
+    sfd = energies(2)
+    pnewdt = 1
+    call uinter(stress, tangent, amki, amski, flux, ddfddt, ddsddt, ddfddr, statev, sed, sfd, spd, svd, scd, pnewdt, &
+      place + moved, moved, temp, dtemp, predef, dpred, time, 1d0, 0d0, ciname, slname, msname, props, coords, &
+      alocaldir, drot, 1d0, 1d0, 7, ndir, nstatv, npred, nprops, mcrd, 1, 1, 1, 0, lopenclose, lstate, lsdi, 0)
+    kept = 0
+    kept(1:2) = [sed, sfd]
+  end subroutine
+  function solved(matrix, right) result(x)
+    real(dp), intent(in) :: matrix(ndir, ndir), right(ndir)
+    real(dp) :: x(ndir), a(ndir, ndir + 1)
+    integer :: i, j
+    a(:, 1:ndir) = matrix
+    a(:, ndir + 1) = right
+    do i = 1, ndir
+      a(i, :) = a(i, :) / a(i, i)
+      do j = 1, ndir
+        if (j /= i) a(j, :) = a(j, :) - a(j, i) * a(i, :)
+      end do
+    end do
+    x = a(:, ndir + 1)
+  end function
+end program
+
+subroutine xit
+  stop 7
+end subroutine
+"""
+RUBBED = 0.3
+SPRING = 0.02  # MPa/mm, of the bodies that the driver presses together
+
+
+def increments(steps, folder, name="calibrated"):
+    """What the driver finds at the ends of increments, each by what is prescribed and its numbers."""
+    ndir = len(steps[0]) - 1
+    text = law_points.text(
+        "abaqus-uinter", name, name="road", kappa=KAPPA, friction=RUBBED
+    )
+    (folder / "road.c").write_text(text)
+    program = INCREMENTS.replace("NDIR", str(ndir)).replace("SPRING", f"{SPRING!r}_dp")
+    (folder / "ask.f90").write_text(program)
+    lines = [" ".join([step[0], *map(repr, step[1:])]) for step in steps]
+    (folder / "steps.txt").write_text("\n".join(lines) + "\n")
+    run("gcc", *WARNINGS, *STRICT, "-O1", "-c", "road.c", folder=folder)
+    run("g++", "-x", "c++", *WARNINGS, "-fsyntax-only", "road.c", folder=folder)
+    fortran = ("gfortran", *WARNINGS, "-std=f2008", "-fcheck=all", "-O1")
+    run(*fortran, "ask.f90", "road.o", "-lm", "-o", "ask", folder=folder)
+    run("./ask", folder=folder)
+    rows = np.loadtxt(folder / "values.txt", ndmin=2)
+    ends = np.cumsum([ndir, ndir, ndir**2, ndir**2, 2, 1])
+    place, stress, tangent, numeric, energy, rounds, residual = np.split(rows, ends, 1)
+    shape = (-1, ndir, ndir)
+    # columns of Fortran
+    matrices = [each.reshape(shape).transpose(0, 2, 1) for each in (tangent, numeric)]
+    return place, stress, *matrices, energy, rounds[:, 0].astype(int), residual
+
+
+@needs("gfortran", "gcc", "g++")
+@pytest.mark.parametrize("name", ["calibrated", "hardened"])
+@pytest.mark.parametrize("directions", [1, 2])
+def test_uinter_sticks_and_slips_as_coulombs_law_says(name, directions, tmp_path):
+    """A path of displacements: stress, tangent and energies are those of springs that slip, integrated by themselves."""
+    rng = np.random.default_rng(63)
+    law = points(name).law
+    sloped, factor = law.unloading()
+    c = np.concatenate([[0.3], 0.3 + 0.1 * np.sin(np.arange(30) / 3), [-0.1, 0.2]])
+    walk = 0.05 * np.cumsum(rng.uniform(-1, 1, (c.size, directions)), axis=0)
+    steps = [("place", *row) for row in np.column_stack([c, walk]).tolist()]
+    place, stress, tangent, numeric, energy, *_ = increments(steps, tmp_path, name)
+    np.testing.assert_allclose(place[:, 0], c, rtol=1e-14)
+    gap = law.h_max - 2 * c
+    p = np.asarray(law.pressure(separation=gap))
+    stiffness = factor * np.asarray(sloped.stiffness(separation=gap)) / KAPPA
+    shear = np.zeros(directions)
+    spent = 0.0
+    before = np.zeros(directions)
+    slipped = []
+    for k in range(c.size):
+        trial = shear + stiffness[k] * (walk[k] - before)
+        size = np.linalg.norm(trial)
+        shear = trial if size <= RUBBED * p[k] else RUBBED * p[k] * trial / size
+        slipped.append(size > RUBBED * p[k])
+        if stiffness[k] > 0:
+            spent += shear @ (trial - shear) / stiffness[k]
+        before = walk[k]
+        np.testing.assert_allclose(stress[k, 1:], shear, rtol=1e-10, atol=1e-14)
+        assert energy[k, 1] == pytest.approx(spent, rel=1e-9)
+    assert 3 < sum(slipped) < c.size - 3
+    np.testing.assert_allclose(stress[:, 0], p, rtol=1e-12)
+    scale = np.abs(numeric).max()
+    np.testing.assert_allclose(tangent, numeric, atol=2e-6 * scale, rtol=2e-5)
+    # apart there is nothing
+    assert (tangent[c < 0] == 0).all()
+    assert (stress[c < 0] == 0).all()
+
+
+@needs("gfortran", "gcc", "g++")
+def test_newton_converges_with_the_tangent_of_uinter(tmp_path):
+    """Bodies that are pressed and moved until the point slips: quadratic with the tangent, slower with its symmetric part."""
+    start, further = (0.6, 0.0, 0.0), (0.8, 1.0, 0.4)
+    ends = {}
+    for kind in ("spring", "symmetry"):
+        folder = tmp_path / kind
+        folder.mkdir()
+        place, stress, *_, rounds, residual = increments(
+            [("place", *start), (kind, *further)], folder
+        )
+        # it slips in equilibrium
+        shear = np.hypot(*stress[1, 1:])
+        assert shear == pytest.approx(RUBBED * stress[1, 0], rel=1e-10)
+        pulled = SPRING * (np.array(further) - place[1])
+        np.testing.assert_allclose(stress[1], pulled, rtol=1e-9)
+        ends[kind] = place[1], int(rounds[1])
+        if kind == "spring":
+            errors = residual[1, : rounds[1] - 1] / residual[1, 0]
+            late = errors[errors < 0.1]
+            assert (late[1:] < 100 * late[:-1] ** 2 + 1e-11).all()
+    np.testing.assert_allclose(ends["spring"][0], ends["symmetry"][0], rtol=1e-8)
+    assert ends["spring"][1] <= 8 < ends["symmetry"][1]
+
+
 @needs("gfortran")
 @pytest.mark.parametrize(
     ("target", "more"), [("abaqus-gapcon", ""), ("calculix-gapcon", ", 1d0")]

@@ -46,6 +46,7 @@ class AskedLaw(NamedTuple):
     functions: dict[str, Function]  # of further quantities
     curves: dict[str, Curve]
     said: tuple[str, ...]  # lines of the header
+    friction: float | None = None  # coefficient, where the solver asks for shear
 
 
 def evaluator(name: str) -> str:
@@ -116,4 +117,6 @@ class Language:
     inverts: bool = True  # whether it has the function `overclosure`
     subroutine: str = ""  # routine of a solver, where it calls the law: of a template
     conductance_alone: bool = False  # whether the solver asks for nothing else
-    frictionless: bool = False  # whether the solver's own friction is lost
+    # what the header says without and with the friction of a joint, where the solver's own
+    # is lost
+    friction: tuple[str, str] | None = None

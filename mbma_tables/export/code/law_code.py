@@ -16,6 +16,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.contacts.law.law import ContactLaw
 from mbma_tables.contacts.quantities.gas import VACUUM
 from mbma_tables.contacts.quantities.registry import registry
+from mbma_tables.contacts.quantities.tangential import checked_friction
 from mbma_tables.effects.force_law import ForceLaw
 from mbma_tables.export.code.functions import Functions
 from mbma_tables.export.code.language import (
@@ -62,6 +63,8 @@ def law_text(
         As for `describe_law`: length_unit, stress_unit, variant, theory, hardness,
         conductivity, conductivity_unit, kappa. Or the force law of a rough sphere or
         cylinder (`RoughContact.law`) alone: its "pressure" is force.
+    friction : float, optional
+        Coefficient of friction, for "abaqus-uinter" alone, with kappa.
     name : str
         What functions, modules or packages are called, or begin with; "law" by default.
     quantity : str or sequence of str, optional
@@ -112,6 +115,10 @@ def law_files(
             f"{target} has no place for leakage or other quantities, nor for the force of a "
             "body: leave it out"
         )
+    if language.friction is None and asked.get("friction") is not None:
+        raise InputError(
+            f"{target} has no place for friction, which the solver has: leave it out"
+        )
     if language.conductance_alone:
         # so that a missing conductivity is refused
         asked.setdefault("conductivity_unit", "")
@@ -130,6 +137,7 @@ def asked_law(
     conductivity: float | None = None,
     conductivity_unit: str | None = None,
     kappa: float | None = None,
+    friction: float | None = None,
     leakage: bool = False,
     gas: GasInGaps | None = None,
     quantity: str | Sequence[str] | None = None,
@@ -150,6 +158,11 @@ def asked_law(
         # quantities need it as that of the bodies
         hardness = options.get("hardness", math.inf)
         bodies = with_conductivity(E_star, hardness, conductivity, conductivity_unit)
+    checked_friction(friction)
+    if friction is not None and kappa is None:
+        raise InputError(
+            "friction needs kappa, the normal over the tangential stiffness before slip"
+        )
     exported = exported_law(surface, bodies, **options)
     parts = Functions(exported)
     if conducts:
@@ -179,7 +192,9 @@ def asked_law(
         end=exported.c_turn,
         leakage="leakage" in parts.functions,
     )
-    return AskedLaw(name, exported, parts.laws, parts.functions, parts.curves, said)
+    return AskedLaw(
+        name, exported, parts.laws, parts.functions, parts.curves, said, friction
+    )
 
 
 def _names(quantity: str | Sequence[str] | None) -> list[str]:
@@ -247,6 +262,7 @@ def text_of(target: str, asked: AskedLaw, file: Beside | None = None) -> str:
         "pieces": pieces,
         "functions": functions,
         "conductance": conductance,
+        "friction": "" if asked.friction is None else language.number(asked.friction),
         "subroutine": language.subroutine,
         "interface": interface,
         **language.parts,
@@ -264,7 +280,11 @@ def _header(language: Language, asked: AskedLaw, interface: str) -> str:
     # the lines of the law may have braces of their own
     said = [line.replace("{", "{{").replace("}", "}}") for line in asked.said]
     paragraphs = [*said, language.usage, _example(asked.exported, language)]
-    lines = [line.format(name=asked.name, interface=interface) for line in paragraphs]
+    friction = ""
+    if language.friction is not None:
+        friction = language.friction[asked.friction is not None]
+    places = {"name": asked.name, "interface": interface, "friction": friction}
+    lines = [line.format_map(places) for line in paragraphs]
     return opening(lines, language.mark)
 
 
@@ -364,10 +384,13 @@ def _call(language: Language, what: str, x: float, y: float) -> str:
 
 
 def _target(name: str, language: Language) -> Target:
+    takes = CODE - {"leakage", "quantity"} if language.subroutine else CODE
+    if language.friction is not None:
+        takes |= {"friction"}
     return Target(
         name,
         functools.partial(law_files, name),
-        CODE - {"leakage", "quantity"} if language.subroutine else CODE,
+        takes,
         rows=False,
         alone=language.alone,
         beside=tuple(file.end for file in language.beside),

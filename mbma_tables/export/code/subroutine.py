@@ -29,7 +29,7 @@ def subroutine(
     usage: str,
     parts: Mapping[str, str],
     conductance_alone: bool = False,
-    frictionless: bool = False,
+    friction: tuple[str, str] | None = None,
 ) -> Language:
     """The C of a law with a routine, whose template is languages/ROUTINE.c."""
     return c_language(
@@ -38,5 +38,5 @@ def subroutine(
         parts=parts,
         subroutine=routine,
         conductance_alone=conductance_alone,
-        frictionless=frictionless,
+        friction=friction,
     )

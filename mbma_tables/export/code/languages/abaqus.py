@@ -18,8 +18,8 @@ LANGUAGES = {
     "abaqus-uinter": subroutine(
         "uinter",
         usage=(
-            "WITHOUT FRICTION: the faces slide freely. *SURFACE INTERACTION, "
-            "NAME={interface}, USER: abaqus job=... user={name}.c. "
+            "{friction} *SURFACE INTERACTION, NAME={interface}, USER: abaqus job=... "
+            "user={name}.c. "
             f"{several_laws('uinter')} "
             "Place the bodies so that their surfaces touch where the mean planes are h_max "
             "apart. Beyond the law's range the increment is tried again with a smaller step. A "
@@ -28,7 +28,12 @@ LANGUAGES = {
             f"{CALLED} Arguments: Abaqus 2017, user subroutines, UINTER."
         ),
         parts=STOP,
-        frictionless=True,
+        friction=(
+            "WITHOUT FRICTION: the faces slide freely.",
+            "WITH FRICTION, whose tangent is not symmetric where the faces slip: add UNSYMM "
+            "to *SURFACE INTERACTION, without which Abaqus takes the symmetric part. Shear "
+            "stresses are in the local directions as Abaqus hands them over, DROT is not used.",
+        ),
     ),
     "abaqus-gapcon": subroutine(
         "gapcon",
