@@ -39,6 +39,7 @@ from mbma_tables.contacts.quantities.leakage import GROUP
 from mbma_tables.tables.splines import coefficients
 from mbma_tables.theories import resolve
 from mbma_tables.theories.calibrated.formulas import (
+    CONSTANTS,
     Constants,
     Law,
     Spectrum,
@@ -69,6 +70,9 @@ NODES = {
 }
 CERTIFICATE = 600  # held-out surfaces, each at its own odds
 BLOCKED = -20.0  # residual of what a law blocks and simulation does not
+# contact fractions at which gaps of surfaces that yield are found
+YIELDED_AREAS = np.concatenate([np.geomspace(0.001, 0.1, 16), np.linspace(0.12, 0.418, 32)])
+LARGEST_YIELDED = 0.4  # A/A0 up to which their constants are fitted
 LARGE = 64.0  # zeta_1 from which surfaces decide between laws, and no constant
 DEGREE = 5
 PROCESSES = 2
@@ -115,6 +119,16 @@ class Case(Simulated):
         law = Law(self.spectrum, self.h_max, constants)
         return law.area(self.force), law.separation(self.force)
 
+    @functools.cached_property
+    def yielded(self) -> FloatArray:
+        """Share of the contact at the hardness, by the calibrated law."""
+        if self.kind != "yielded":
+            return np.zeros(self.force.shape)
+        hardness = float(self.node[-1]) * self.spectrum.gradient
+        theory = Yielding(resolve("calibrated"), hardness)
+        separation = self.law(CONSTANTS)[1]
+        return np.asarray(theory.loaded(self.surface, separation).yielded)
+
 
 def cases(data: xr.Dataset) -> list[Case]:
     """Surfaces of a file by `python -m generate boundary_elements --of leakage`."""
@@ -151,10 +165,15 @@ class Flow:
         force_of_area = force_at_area(self.area, factor, constants)
         load = force_of_area if one.kind == "yielded" else one.force
         self._gaps = leakage.gaps(one.spectrum, load, constants)
+        self._medium = self._gaps
+        if one.kind == "yielded":
+            # the medium's are those of smaller elastic contacts
+            loads = force_at_area(YIELDED_AREAS, factor, constants)
+            self._medium = leakage.gaps(one.spectrum, loads, constants)
 
     @functools.cache  # noqa: B019 - there are as many surfaces as the file has
     def log_factor(self, flow: FlowConstants) -> FloatArray:
-        return leakage.log_factor(self._gaps, flow)
+        return leakage.log_factor(self._medium, flow)
 
     def medium(
         self,
@@ -165,10 +184,13 @@ class Flow:
         """The law; of another area and mean gap than the calibrated law's where there are any."""
         factor = self.log_factor(flow)
         gap = self.u if u is None else u
+        if self.one.kind == "yielded":
+            loaded = self.area if area is None else area
+            area = flow.elastic_area(loaded, self.one.yielded)
         if area is not None:
             # by interpolation between the loads
-            percolates = self._gaps.area < flow.threshold - leakage.NEAREST
-            odds = log_odds(self._gaps.area[percolates], flow.threshold)
+            percolates = self._medium.area < flow.threshold - leakage.NEAREST
+            odds = log_odds(self._medium.area[percolates], flow.threshold)
             # areas above the threshold have no odds
             below_threshold = np.minimum(area, flow.threshold * (1 - 1e-9))
             odds_of_area = log_odds(below_threshold, flow.threshold)
@@ -223,6 +245,7 @@ def fit(training: Sequence[Flow], first: FlowConstants | None = None) -> FlowCon
     Of contact fractions up to `leakage.LARGEST_AREA`.
     """
     seen = [flow for flow in training if flow.one.isotropic]
+    largest_area = leakage.LARGEST_AREA
 
     def residuals(form: Form, constants: FlowConstants) -> list[FloatArray]:
         parts = []
@@ -230,7 +253,7 @@ def fit(training: Sequence[Flow], first: FlowConstants | None = None) -> FlowCon
             noise = NOISE[0] + NOISE[1] * flow.one.area**2
             miss = (form(flow, constants) - flow.one.log_k) / noise
             # the law may block what was open
-            parts.append(np.maximum(miss[flow.one.area < leakage.LARGEST_AREA], BLOCKED))
+            parts.append(np.maximum(miss[flow.one.area < largest_area], BLOCKED))
         return parts
 
     def best(
@@ -246,7 +269,14 @@ def fit(training: Sequence[Flow], first: FlowConstants | None = None) -> FlowCon
 
     start = first or FlowConstants()
     law = best(start, ("threshold", "obstruction"), Flow.medium, x_scale=[0.01, 0.1])
-    return best(law, ("prefactor", "exponent"), Flow.closed_form)
+    found = best(law, ("prefactor", "exponent"), Flow.closed_form)
+    seen = [flow for flow in training if flow.one.kind == "yielded"]
+    if not seen:
+        return found
+    # up to where they block, which is at larger areas than for elastic contacts
+    largest_area = LARGEST_YIELDED
+    names = ("yielded_threshold", "yielded_exponent", "yielded_power")
+    return best(found, names, Flow.medium, x_scale=[0.01, 0.1, 1.0])
 
 
 def left_out(training: Sequence[Flow], constants: FlowConstants) -> FloatArray:
@@ -302,7 +332,8 @@ SETS: dict[str, Callable[[Case], bool]] = {
     "held out": lambda one: one.plain and one.split != TRAINING,
     "plateaus": lambda one: one.kind == "plateau",
     "stretched": lambda one: one.kind == "stretched",
-    "yielded": lambda one: one.kind == "yielded",
+    "yielded, training": lambda one: one.kind == "yielded" and one.split == TRAINING,
+    "yielded, held out": lambda one: one.kind == "yielded" and one.split != TRAINING,
     "zeta_1 32, two waves": lambda one: one.zeta_1 == 32 and one.waves < MIN_WAVES,
     "zeta_1 64 and 128": lambda one: one.zeta_1 >= LARGE,
 }

@@ -96,6 +96,9 @@ FLOW_AREAS = (
     0.3,
     0.35,
     0.4,
+    0.45,
+    0.5,
+    0.55,
 )  # that loads of surfaces that yield aim at
 RANGES = np.geomspace(0.001, 10.0, 25)  # of attractions, over h_rms
 GAP_TOLERANCE = 1e-5

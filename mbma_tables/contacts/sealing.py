@@ -17,7 +17,7 @@ from mbma_tables.contacts.law.law import ContactLaw
 from mbma_tables.contacts.quantities.gas_flow import RATE_UNITS, gas_scatter
 
 LIGHTEST = 1e-5  # A/A0 of the lightest contact that is tried
-FULLEST = 0.5  # and of the fullest: contact blocks flow before
+FULLEST = 0.65  # and of the fullest: contact blocks flow before
 BLOCKED = -1e3  # stands for ln of a rate of zero
 BESIDE = 1e-6  # share of the area
 REACHED = 1e-3  # ln of the rate over the wanted one

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from mbma_tables.contacts.law import block as fit
 from mbma_tables.contacts.quantities.effective_medium import wide_gap
 from mbma_tables.contacts.quantities.leakage import (
     along,
+    area_of_flow,
     degrees,
     flow,
     shipped_flow,
@@ -86,11 +88,13 @@ class LeakageLaw:
         apart = (flat > self.block[fit.HIGHEST]) & (flat < np.inf)
         gap = self.law.both_separations("separation", flat[apart])[1]
         found[apart] = gap**3 * wide_gap(gap / self.h_rms)
-        # what percolates in the elastic contact is not known to block the yielded one
+        # simulated gaps that are blocked where nothing yields may be open where it does
         theory = self.law.setup.theory_of(self.law.setup.bodies)
         blocked = np.flatnonzero(found == 0)
-        yields_elsewhere = theory.elastic is not theory and not getattr(
-            self.law.gaps, "of_yielded_gaps", False
+        yields_elsewhere = (
+            self.law.gaps is not None
+            and theory.elastic is not theory
+            and not getattr(self.law.gaps, "of_yielded_gaps", False)
         )
         # theories are asked at one gap at least
         if yields_elsewhere and blocked.size:
@@ -110,11 +114,22 @@ def leakage_law(
         min(law.h_max, law.highest) if law.block.view(np.int64)[fit.ENDS] else law.highest
     )
     turns: tuple[float, ...] = ()
+    theory = law.setup.theory_of(law.setup.bodies)
+
+    def obstructing(d: FloatArray) -> FloatArray:
+        """A/A0 of the elastic contact that obstructs flow alike."""
+        u = (law.h_max + d) / 2
+        return area_of_flow(theory, surface, u, np.asarray(law.area(separation=d)))
+
     if law.gaps is None:
         threshold = shipped_flow().constants.threshold
         deepest = law.lowest if law.area_turning_point is None else law.area_turning_point
-        blocked = bool(law.area(separation=deepest) >= threshold)
-        bottom = float(law.separation(area=threshold)) if blocked else law.lowest
+        blocked = bool(obstructing(np.array(deepest)) >= threshold)
+        bottom = law.lowest
+        if blocked and theory.elastic is theory:
+            bottom = float(law.separation(area=threshold))
+        elif blocked:
+            bottom = _blocked_gap(obstructing, threshold, deepest, top)
         head = law.block
         turns = tuple(
             head[k] * head[k + 1] for k in (fit.KINK_SIGN, fit.KINK_SIGN_2) if head[k]
@@ -128,7 +143,7 @@ def leakage_law(
     def coefficient(d: FloatArray) -> FloatArray:
         u = (law.h_max + d) / 2
         if law.gaps is None:
-            return h_rms**3 * flow(surface, u, np.asarray(law.area(separation=d)))
+            return h_rms**3 * flow(surface, u, obstructing(d))
         x, y, xy = law.gaps.flow(surface, u)
         return np.asarray(
             np.sqrt(x * y) if direction is None else along(direction, x, y, xy)
@@ -169,6 +184,25 @@ def leakage_law(
         h_rms = law.h_max / np.sqrt(max(1.5 / max(missed, 1e-6) - 4, 1e-3))
     blocked_at = (law.h_max + bottom) / 2 if blocked else -np.inf
     return LeakageLaw(law, h_rms, blocked_at, error, frozen(block))
+
+
+def _blocked_gap(
+    obstructing: Callable[[FloatArray], FloatArray],
+    threshold: float,
+    low: float,
+    high: float,
+) -> float:
+    """Separation at which a contact that yields blocks flow."""
+    from scipy.optimize import brentq
+
+    found: float = brentq(
+        lambda d: float(obstructing(np.array(d))) - threshold,
+        low,
+        high,
+        xtol=1e-15,
+        rtol=1e-15,
+    )
+    return found
 
 
 def _ends(law: Any, direction: float | None) -> tuple[float, tuple[float, ...]]:

@@ -47,6 +47,20 @@ class FlowConstants:
     obstruction: float = 0.89  # m, of contact below it
     prefactor: float = 0.77  # of the closed form prefactor u^3 (1 - A/Ac)^exponent
     exponent: float = 3.04
+    # of contacts that yield, whose patches are compact and leave wider channels: what a
+    # contact that yields everywhere adds to the threshold and to the power of its area, and
+    # the power of its yielded share with which both grow
+    yielded_threshold: float = 0.17
+    yielded_exponent: float = 0.2
+    yielded_power: float = 6.7
+
+    def elastic_area(self, area: ArrayLike, yielded: ArrayLike) -> FloatArray:
+        """A/A0 of the elastic contact that obstructs flow as one does of which a share is at its hardness."""
+        share = np.asarray(area, float)
+        growth = np.asarray(yielded, float) ** self.yielded_power
+        threshold = self.threshold + self.yielded_threshold * growth
+        bent = (share / threshold) ** (self.yielded_exponent * growth)
+        return np.asarray(share * (self.threshold / threshold) * bent)
 
     def closed_form(self, u: ArrayLike, area: ArrayLike) -> FloatArray:
         """k at mean gaps u [h_rms] and A/A0 without a spectrum, for zeta_1 up to 32; 0 at and above the threshold."""
