@@ -71,7 +71,9 @@ NODES = {
 CERTIFICATE = 600  # held-out surfaces, each at its own odds
 BLOCKED = -20.0  # residual of what a law blocks and simulation does not
 # contact fractions at which gaps of surfaces that yield are found
-YIELDED_AREAS = np.concatenate([np.geomspace(0.001, 0.1, 16), np.linspace(0.12, 0.418, 32)])
+YIELDED_AREAS = np.concatenate(
+    [np.geomspace(0.001, 0.1, 16), np.linspace(0.12, 0.418, 32)]
+)
 LARGEST_YIELDED = 0.4  # A/A0 up to which their constants are fitted
 LARGE = 64.0  # zeta_1 from which surfaces decide between laws, and no constant
 DEGREE = 5

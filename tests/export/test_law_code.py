@@ -336,7 +336,7 @@ def test_python(name, tmp_path):
         )
     assert road.pressure(known.c[:6].reshape(2, 3)).shape == (2, 3)
     assert float(road.pressure(float(known.c[0]))) == road.pressure(known.c)[0]
-    assert np.isnan(road.leakage(known.c)).any() == (name == "hardened")
+    assert not np.isnan(road.leakage(known.c)).any()
     for bad in ([1.0, 1e9], math.nan, math.inf):
         with pytest.raises(ValueError, match=r"overclosure must be in \[.*\] mm, got"):
             road.pressure(bad)
@@ -347,8 +347,10 @@ def test_python(name, tmp_path):
         assert run(sys.executable, "-c", code, folder=tmp_path) == "[]\n"
 
 
-@pytest.mark.parametrize("hardness", [0.6, 1.5, 5.0])
-def test_the_flow_of_a_yielded_seal_is_not_zero_where_the_elastic_one_is_blocked(hardness):
+@pytest.mark.parametrize("hardness", [0.02, 0.6, 5.0])
+def test_the_flow_of_a_yielded_seal_is_not_zero_where_the_elastic_one_is_blocked(
+    hardness,
+):
     made = law_of_names(
         law_points.ROAD, "13.3 MPa", theory="calibrated", hardness=hardness
     )
@@ -358,10 +360,8 @@ def test_the_flow_of_a_yielded_seal_is_not_zero_where_the_elastic_one_is_blocked
     )  # fmt: skip
     road = types.ModuleType("road")
     exec(text, road.__dict__)
-    elastic = law_of_names(law_points.ROAD, "13.3 MPa", theory="calibrated")
-    blocked = elastic.separation(area=0.42)
     blocked_at = made.leakage.blocked_at
-    assert hardness == 5.0 or blocked_at < (3.0 + blocked) / 2
+    assert (made.area(blocked_at) > 0.5) == (hardness == 0.02)
     c = 3.0 - np.geomspace(1e-5, 2.9, 2001)
     known = np.asarray(made.leakage(3.0 - c))
     np.testing.assert_allclose(road.leakage(c), known, rtol=VALUES, atol=1e-12)

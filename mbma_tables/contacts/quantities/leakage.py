@@ -456,9 +456,7 @@ def reasons_against(
         if simulated is not None:
             found["leakage: yielded contacts leak several times more"] = yields
         elif theory.elastic.name != "calibrated":
-            alone = (
-                "leakage: flow through yielded contacts was compared for 'calibrated' alone"
-            )
+            alone = "leakage: flow through yielded contacts was compared for 'calibrated' alone"
             found[alone] = yields
     for reason in theory.reasons_of_flow():
         found[reason] = everywhere

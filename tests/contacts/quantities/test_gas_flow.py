@@ -12,7 +12,6 @@ from helpers import refusals
 from scipy.integrate import quad
 
 from mbma_tables import (
-    Bodies,
     InputError,
     OutOfRangeError,
     Surface,
@@ -229,18 +228,6 @@ test_what_is_refused = refusals(
         ),
         OutOfRangeError,
         "leaks less",
-    ),
-    (
-        lambda: sealing_pressure(
-            contact_law(FACE, Bodies("20 GPa", hardness="0.3 GPa"), theory="calibrated"),
-            "1e-60 mbar l/s",
-            gas="helium",
-            inlet="1 bar",
-            outlet="0 bar",
-            width="2 mm",
-        ),
-        OutOfRangeError,
-        "its flow is not known; it leaks more before",
     ),
     error=InputError,
 )
