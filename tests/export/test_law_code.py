@@ -716,6 +716,32 @@ def increments(steps, folder, name="calibrated"):
     return place, stress, *matrices, energy, rounds[:, 0].astype(int), residual
 
 
+def sheared(law, c, walk):
+    """Pressure, shear stress, elastic and dissipated energy of a spring that slips, along a path."""
+    sloped, factor = law.unloading()
+    gap = law.h_max - 2 * c
+    p = np.asarray(law.pressure(separation=gap))
+    stiffness = factor * np.asarray(sloped.stiffness(separation=gap)) / KAPPA
+    shear = np.zeros_like(walk)
+    spent = np.zeros(c.size)
+    elastic = np.array(law.values(separation=gap).energy)
+    last, before, slips = np.zeros(walk.shape[1]), np.zeros(walk.shape[1]), 0
+    for k in range(c.size):
+        trial = last + stiffness[k] * (walk[k] - before)
+        size = np.linalg.norm(trial)
+        last = trial
+        if size > RUBBED * p[k]:
+            last = RUBBED * p[k] * trial / size
+            slips += 1
+        shear[k] = last
+        spent[k] = spent[k - 1] if k else 0.0
+        if stiffness[k] > 0:
+            elastic[k] += last @ last / (2 * stiffness[k])
+            spent[k] += last @ (trial - last) / stiffness[k]
+        before = walk[k]
+    return p, shear, elastic, spent, slips
+
+
 @needs("gfortran", "gcc", "g++")
 @pytest.mark.parametrize("name", ["calibrated", "hardened"])
 @pytest.mark.parametrize("directions", [1, 2])
@@ -723,36 +749,95 @@ def test_uinter_sticks_and_slips_as_coulombs_law_says(name, directions, tmp_path
     """A path of displacements: stress, tangent and energies are those of springs that slip, integrated by themselves."""
     rng = np.random.default_rng(63)
     law = points(name).law
-    sloped, factor = law.unloading()
     c = np.concatenate([[0.3], 0.3 + 0.1 * np.sin(np.arange(30) / 3), [-0.1, 0.2]])
     walk = 0.05 * np.cumsum(rng.uniform(-1, 1, (c.size, directions)), axis=0)
     steps = [("place", *row) for row in np.column_stack([c, walk]).tolist()]
     place, stress, tangent, numeric, energy, *_ = increments(steps, tmp_path, name)
     np.testing.assert_allclose(place[:, 0], c, rtol=1e-14)
-    gap = law.h_max - 2 * c
-    p = np.asarray(law.pressure(separation=gap))
-    stiffness = factor * np.asarray(sloped.stiffness(separation=gap)) / KAPPA
-    shear = np.zeros(directions)
-    spent = 0.0
-    before = np.zeros(directions)
-    slipped = []
-    for k in range(c.size):
-        trial = shear + stiffness[k] * (walk[k] - before)
-        size = np.linalg.norm(trial)
-        shear = trial if size <= RUBBED * p[k] else RUBBED * p[k] * trial / size
-        slipped.append(size > RUBBED * p[k])
-        if stiffness[k] > 0:
-            spent += shear @ (trial - shear) / stiffness[k]
-        before = walk[k]
-        np.testing.assert_allclose(stress[k, 1:], shear, rtol=1e-10, atol=1e-14)
-        assert energy[k, 1] == pytest.approx(spent, rel=1e-9)
-    assert 3 < sum(slipped) < c.size - 3
+    p, shear, elastic, spent, slips = sheared(law, c, walk)
+    np.testing.assert_allclose(stress[:, 1:], shear, rtol=1e-10, atol=1e-14)
+    np.testing.assert_allclose(energy[:, 0], elastic, rtol=1e-9)
+    np.testing.assert_allclose(energy[:, 1], spent, rtol=1e-9)
+    assert 3 < slips < c.size - 3
     np.testing.assert_allclose(stress[:, 0], p, rtol=1e-12)
     scale = np.abs(numeric).max()
     np.testing.assert_allclose(tangent, numeric, atol=2e-6 * scale, rtol=2e-5)
     # apart there is nothing
     assert (tangent[c < 0] == 0).all()
     assert (stress[c < 0] == 0).all()
+
+
+# all nodes of a surface at once, each with its own path; energies are written to, not added
+EXPLICIT = """program explicit
+  use, intrinsic :: iso_fortran_env, only: dp => real64
+  implicit none
+  integer, parameter :: nodes = NODES, ndir = NDIR, n = nodes, nprops = 1
+  real(dp) :: stress(ndir, nodes), sed(n), sfd(n), scd(n), spd(n), svd(n), fluxslv(n), fluxmst(n), statev(1, n)
+  real(dp) :: rdisp(ndir, n), drdisp(ndir, n), drot(2, 2, n), stiff(n), cond(n), shapes(4, n), coord(ndir, n)
+  real(dp) :: local(ndir, ndir, n), props(nprops), area(n), temp(n), dtemp(n), predef(1, n), dpredef(1, n)
+  integer :: status, uid(n), con(4, n)
+  character(len=80) :: surfint, surfslv, surfmst
+  call get_command_argument(1, surfint)
+  rdisp = 0
+  stress = 0
+  open (10, file="steps.txt")
+  open (11, file="values.txt")
+  do
+    drdisp = rdisp
+    read (10, *, iostat=status) rdisp
+    if (status /= 0) exit
+    drdisp = rdisp - drdisp
+    sed = -1
+    sfd = -1
+    call vuinter(sfd, scd, spd, svd, stress, fluxslv, fluxmst, sed, statev, 1, 1, 4, nodes, 4, 2, ndir, 1, nprops, 0, &
+      1, n, uid, uid, con, 1d0, 1d0, 1d-6, surfint, surfslv, surfmst, rdisp, drdisp, drot, stiff, cond, shapes, coord, &
+      coord, local, props, area, temp, dtemp, predef, dpredef, temp, dtemp, predef, dpredef)
+    write (11, "(*(es25.16e3))") stress, sed, sfd
+  end do
+end program
+
+subroutine xplb_exit
+  stop 7
+end subroutine
+"""
+
+
+@needs("gfortran", "gcc", "g++")
+@pytest.mark.parametrize("name", ["calibrated", "hardened"])
+@pytest.mark.parametrize("directions", [1, 2])
+def test_vuinter_has_the_law_at_all_nodes(name, directions, tmp_path):
+    rng = np.random.default_rng(64)
+    law = points(name).law
+    nodes, steps = 4, 30
+    c = 0.3 + 0.1 * np.sin(np.arange(steps) / 3 + np.arange(nodes)[:, None])
+    # one that lifts off and comes back
+    c[-1, 10:15] = -0.1
+    walk = 0.05 * np.cumsum(rng.uniform(-1, 1, (nodes, steps, directions)), axis=1)
+    places = np.concatenate([c[..., None], walk], axis=2).transpose(1, 0, 2)
+    np.savetxt(tmp_path / "steps.txt", places.reshape(steps, -1), "%.17g")
+    asked = {"kappa": KAPPA, "friction": RUBBED}
+    text = law_points.text("abaqus-vuinter", name, name="road", **asked)
+    (tmp_path / "road.c").write_text(text)
+    program = EXPLICIT.replace("NODES", str(nodes)).replace("NDIR", str(1 + directions))
+    (tmp_path / "ask.f90").write_text(program)
+    run("gcc", *WARNINGS, *STRICT, "-O1", "-c", "road.c", folder=tmp_path)
+    run("g++", "-x", "c++", *WARNINGS, "-fsyntax-only", "road.c", folder=tmp_path)
+    fortran = ("gfortran", *WARNINGS, "-std=f2008", "-fcheck=all", "-O1")
+    run(*fortran, "ask.f90", "road.o", "-lm", "-o", "ask", folder=tmp_path)
+    run("./ask", "ROAD", folder=tmp_path)
+    rows = np.loadtxt(tmp_path / "values.txt")
+    stress, sed, sfd = np.split(rows, [nodes * (1 + directions), -nodes], axis=1)
+    stress = stress.reshape(steps, nodes, 1 + directions)
+    for node in range(nodes):
+        p, shear, elastic, spent, slips = sheared(law, c[node], walk[node])
+        assert slips > 3
+        np.testing.assert_allclose(stress[:, node, 0], p, rtol=1e-12)
+        np.testing.assert_allclose(stress[:, node, 1:], shear, rtol=1e-9, atol=1e-14)
+        np.testing.assert_allclose(sed[:, node], elastic, rtol=1e-9)
+        np.testing.assert_allclose(np.cumsum(sfd[:, node]), spent, rtol=1e-9)
+    done = subprocess.run(("./ask", "SEAL"), cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 7
+    assert "no law for the surface interaction 'SEAL', only for 'ROAD'" in done.stderr
 
 
 @needs("gfortran", "gcc", "g++")

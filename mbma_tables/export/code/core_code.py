@@ -127,7 +127,14 @@ def core_text(prefix: str) -> str:
 def _code_mark() -> str:
     """A number of all code that laws in one file share, where other code is refused."""
     code = core_text("")
-    for name in ("law.c", "interfaces.c", "friction.c", "uinter.c", "gapcon.c"):
+    for name in (
+        "law.c",
+        "interfaces.c",
+        "friction.c",
+        "uinter.c",
+        "vuinter.c",
+        "gapcon.c",
+    ):
         code += template(f"{FOLDER}/{name}")
     return f"0x{zlib.crc32(code.encode()):08x}"
 

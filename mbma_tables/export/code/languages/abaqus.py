@@ -1,4 +1,4 @@
-"""Laws as user subroutines of Abaqus/Standard: UINTER and GAPCON."""
+"""Laws as user subroutines of Abaqus: UINTER and GAPCON of Standard, VUINTER of Explicit."""
 
 from mbma_tables.export.code.subroutine import LAST_VALUE, several_laws, subroutine
 
@@ -12,6 +12,10 @@ STOP = {
         "SUBROUTINE FOR_NAME(xit, XIT)(void); /* of Abaqus, closes its files */"
     ),
     "stop": "FOR_NAME(xit, XIT)()",
+}
+STOP_EXPLICIT = {
+    "stop_declared": "SUBROUTINE FOR_NAME(xplb_exit, XPLB_EXIT)(void); /* of Abaqus */",
+    "stop": "FOR_NAME(xplb_exit, XPLB_EXIT)()",
 }
 
 LANGUAGES = {
@@ -33,6 +37,24 @@ LANGUAGES = {
             "WITH FRICTION, whose tangent is not symmetric where the faces slip: add UNSYMM "
             "to *SURFACE INTERACTION, without which Abaqus takes the symmetric part. Shear "
             "stresses are in the local directions as Abaqus hands them over, DROT is not used.",
+        ),
+    ),
+    "abaqus-vuinter": subroutine(
+        "vuinter",
+        usage=(
+            "{friction} *SURFACE INTERACTION, NAME={interface}, USER of a *CONTACT PAIR: "
+            "abaqus job=... double=both user={name}.c, since all numbers are of double "
+            f"precision. {several_laws('vuinter')} "
+            "Place the bodies so that their surfaces touch where the mean planes are h_max "
+            "apart. Without heat. The law's tangent is a stiffness that the time increment "
+            f"must resolve, which Abaqus does not know. {LAST_VALUE} {CALLED} "
+            "Arguments: Abaqus 2017, user subroutines, VUINTER."
+        ),
+        parts=STOP_EXPLICIT,
+        friction=(
+            "WITHOUT FRICTION: the faces slide freely.",
+            "WITH FRICTION. Shear stresses are in the local directions as Abaqus hands them "
+            "over, DROT is not used; SFD is what slip dissipates in the increment.",
         ),
     ),
     "abaqus-gapcon": subroutine(
