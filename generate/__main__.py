@@ -32,6 +32,7 @@ COMMANDS = {
     "rough_spheres": "generate.rough_spheres",
     "score": "generate.distances",
     "tables": "generate.tables",
+    "unloading": "generate.unloading",
 }
 
 

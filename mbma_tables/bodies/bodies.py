@@ -13,13 +13,16 @@ from numpy.typing import ArrayLike
 from mbma_tables.bodies import materials
 from mbma_tables.bodies.materials import Metal, Pair
 from mbma_tables.common.arguments import (
+    FloatArray,
     Numbers,
     broadcast_shape,
     checked_hardness,
     detached,
+    finite_array,
     is_labelled,
     one_number,
     positive_array,
+    require,
     require_fields,
 )
 from mbma_tables.common.distributions import distributions_in
@@ -58,6 +61,11 @@ class Bodies:
         Largest pressure that the softer body supports, in the unit of `E_star`, or a text
         that `mbma_tables.bodies.materials.hardness` accepts: "1.5 GPa", "200 HV". Default: that of
         the softer of `metals`.
+    largest_pressure : array_like or str, optional
+        The largest nominal pressure under which the bodies were pressed together so far, in
+        the unit of `E_star`. Contacts with a hardness then unload and reload below it, on
+        what yielded; heavier ones are those of first loading. Without a hardness it changes
+        nothing. Default: every contact is reached by first loading.
     nu : float or pair of float, optional
         Poisson's ratio, one of both bodies, or one of each together with `E`; for
         tangential stiffness.
@@ -88,6 +96,7 @@ class Bodies:
     E_star: Any = None
     _: dataclasses.KW_ONLY
     hardness: Any = None
+    largest_pressure: Any = None
     nu: Any = None
     E: Any = None
     conductivity: Any = None
@@ -189,6 +198,10 @@ class Bodies:
         E_star = self.E_star
         if not is_array(E_star):
             E_star = number_with_unit("E_star", E_star, unit)
+        largest = self.largest_pressure
+        if largest is not None and not is_array(largest):
+            of_modulus = stated_unit("E_star", E_star) or unit
+            largest = number_with_unit("largest_pressure", largest, of_modulus)
         hardness = self.hardness
         is_one = hardness is not None and not is_array(hardness)
         if is_one and not np.array_equal(hardness, np.inf):
@@ -197,7 +210,9 @@ class Bodies:
             with_unit = number_with_unit("hardness", text, of_modulus)
             # what states its unit already stays as it was written, "200 HV"
             hardness = hardness if with_unit == text else with_unit
-        return dataclasses.replace(self, E_star=E_star, hardness=hardness)
+        return dataclasses.replace(
+            self, E_star=E_star, hardness=hardness, largest_pressure=largest
+        )
 
     def in_units(self, surface: Any, stress_unit: str | None = None) -> BodiesInUnits:
         """The constants as numbers, in the surface's unit of length and the modulus's, or another, of stress."""
@@ -209,7 +224,26 @@ class Bodies:
             hardness = materials.hardness_in(units, self.hardness)
             if isinstance(hardness, float) or not is_labelled(hardness):
                 hardness = checked_hardness(hardness)[()]
-        return BodiesInUnits(self, E_star, hardness, units)
+        largest = self.largest_pressure
+        if largest is not None:
+            largest = units.number("largest_pressure", largest)
+            if isinstance(largest, float) or not is_labelled(largest):
+                largest = checked_largest(largest)[()]
+        return BodiesInUnits(self, E_star, hardness, units, largest)
+
+
+def after(bodies: Bodies, largest_pressure: Any) -> Bodies:
+    """The same bodies after a largest pressure, which they may not have already."""
+    if bodies.largest_pressure is not None:
+        raise InputError("largest_pressure is given twice, of bodies and beside them")
+    return dataclasses.replace(bodies, largest_pressure=largest_pressure)
+
+
+def checked_largest(pressure: Any) -> FloatArray:
+    """Largest pressures as numbers of at least 0, where there was none."""
+    array = finite_array("largest_pressure", pressure)
+    require("largest_pressure", array, array >= 0, "at least 0")
+    return array
 
 
 def is_array(value: Any) -> bool:
@@ -235,6 +269,8 @@ class BodiesInUnits:
     E_star: Any
     hardness: Any  # infinite where nothing yields
     units: Units
+    #: largest nominal pressure so far; None where contacts are those of first loading
+    largest: Any = None
     #: mean conductivity in place of that of `bodies`, as `conductivity` has it
     k_s: Any = None
 
@@ -303,9 +339,19 @@ class BodiesInUnits:
         if conductivity is not None:
             one_number("conductivity", conductivity)
 
-    def at(self, E_star: Any, hardness: Any) -> BodiesInUnits:
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What a contact depends on, in the order of `at`."""
+        numbers = {"E_star": self.E_star, "hardness": self.hardness}
+        if self.largest is not None:
+            numbers["largest_pressure"] = self.largest
+        return numbers
+
+    def at(self, E_star: Any, hardness: Any, largest: Any = None) -> BodiesInUnits:
         """The same bodies with other numbers, such as those of a block of an array."""
-        return dataclasses.replace(self, E_star=E_star, hardness=hardness)
+        return dataclasses.replace(
+            self, E_star=E_star, hardness=hardness, largest=largest
+        )
 
 
 def mean_conductivity(k1: ArrayLike, k2: ArrayLike) -> Numbers:

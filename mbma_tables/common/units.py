@@ -66,7 +66,7 @@ _NAMES_OF_POWERS = {
     ),
     (0, 1): (
         "viscosity pressure_drop E_star E E1 E2 hardness pressure pressures shear "
-        "gas_pressure inlet outlet"
+        "gas_pressure inlet outlet largest_pressure"
     ),
     (-1, 0): "q0 q1",
     (-2, 0): "D m4",

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.bodies.bodies import Bodies, BodiesInUnits
+from mbma_tables.bodies.bodies import Bodies, BodiesInUnits, after, checked_largest
 from mbma_tables.common.arguments import (
     FloatArray,
     any_labelled,
@@ -49,6 +49,7 @@ def contact(
     mean_separation: ArrayLike | None = None,
     pressure: ArrayLike | None = None,
     area: ArrayLike | None = None,
+    largest_pressure: ArrayLike | str | None = None,
     theory: str | Theory | UserTheory | None = None,
 ) -> Contact:
     """Contact of a surface at a given separation, pressure or area.
@@ -75,6 +76,10 @@ def contact(
         at first contact. Each of several pressures is reached by first loading.
     area : array_like
         A/A0, on the same branch.
+    largest_pressure : array_like or str, optional
+        The largest pressure so far, where a hardness is given: contacts below it are those
+        of unloading and reloading, after what yielded under it. `Bodies` may have it, too.
+        Default: first loading.
     theory : str or theory, optional
         By name, one of `mbma_tables.theories.THEORIES`, or an object: one of
         `mbma_tables.theories` with its own options, such as ``Mbma(island_model="exact")``,
@@ -122,6 +127,8 @@ def contact(
         "pressure": pressure,
         "area": area,
     }
+    if largest_pressure is not None:
+        bodies = after(Bodies.of(bodies), largest_pressure)
     return contact_of(surface, bodies, candidates, theory)
 
 
@@ -140,9 +147,9 @@ def contact_of(
     )
     question = Question.of(in_units.units, candidates)
     setup = Setup(surface, in_units, resolve(theory, surface, question.name), interface)
-    if any_labelled(surface, question.value, in_units.E_star, in_units.hardness):
+    if any_labelled(surface, question.value, *in_units.numbers.values()):
         return _of_labelled(setup, question)
-    solved, gaps = _solved(setup, surface, question, in_units.E_star, in_units.hardness)
+    solved, gaps = _solved(setup, surface, question, *in_units.numbers.values())
     values = {
         "pressure": solved.pressure,
         "area": solved.area,
@@ -159,6 +166,7 @@ def _solved(
     question: Question,
     E_star: Any,
     hardness: Any,
+    largest: Any = None,
 ) -> tuple[Solved, Gaps]:
     """The contact of plain arrays at a given quantity, and its separations.
 
@@ -172,13 +180,14 @@ def _solved(
             "surface": surface.h_rms,
             "E_star": modulus,
             "hardness": cap,
+            "largest_pressure": 0.0 if largest is None else np.asarray(largest),
         }
     )
     question = Question(question.name, spread(question.value, shape))
     modulus = spread(modulus, shape)
     theory = setup.theory
     if setup.bodies.yields:
-        theory = with_hardness(theory, cap, modulus)
+        theory = with_hardness(theory, cap, modulus, largest)
     gaps = _separations(setup, theory, surface, question, modulus, cap)
     return theory.solved(surface, gaps, modulus), gaps
 
@@ -192,7 +201,7 @@ def _separations(
     cap: FloatArray,
 ) -> Gaps:
     """Both separations for the given quantity."""
-    h_max = np.asarray(surface.h_max)
+    h_max = theory.highest(surface)
     name = question.name
     gap = question.value
     is_gap = name in GAPS
@@ -272,17 +281,19 @@ def _of_labelled(setup: Setup, question: Question) -> Contact:
     bodies = setup.bodies
 
     def solve(
-        block: AnySurface, given: Any, E_star: Any, hardness: Any
+        block: AnySurface, given: Any, E_star: Any, hardness: Any, *largest: Any
     ) -> tuple[Any, ...]:
         modulus = positive_array("E_star", E_star)
         cap = checked_hardness(hardness)
-        solved, gaps = _solved(setup, block, question.of_block(given), modulus, cap)
+        before = [checked_largest(pressure) for pressure in largest]
+        asked = question.of_block(given)
+        solved, gaps = _solved(setup, block, asked, modulus, cap, *before)
         answer = solved.pressure, solved.area, solved.error
         return (gaps.separation, gaps.mean_separation, *answer)
 
     name = question.name
     value = question.value
-    arrays = {name: value, "E_star": bodies.E_star, "hardness": bodies.hardness}
+    arrays = {name: value, **bodies.numbers}
     outputs = apply_to_surface(solve, setup.surface, arrays, len(ANSWERED))
     contact = Contact(setup, dict(zip(ANSWERED, outputs, strict=True)))
     # a separation that was given keeps its name and attributes

@@ -79,9 +79,9 @@ class Setup:
         """The theory, with the bodies' hardness where they have one."""
         if not self.bodies.yields:
             return self.theory
-        broadcast_shape(E_star=bodies.E_star, hardness=bodies.hardness)
+        broadcast_shape(**bodies.numbers)
         hardness = checked_hardness(bodies.hardness)
-        return with_hardness(self.theory, hardness, bodies.E_star)
+        return with_hardness(self.theory, hardness, bodies.E_star, bodies.largest)
 
 
 class Contact(State, Displayed):
@@ -245,17 +245,15 @@ class Contact(State, Displayed):
         bodies = self.bodies
         arrays = {
             "mean_separation": self.mean_separation,
-            "E_star": bodies.E_star,
-            "hardness": bodies.hardness,
+            **bodies.numbers,
             **(more or {}),
         }
+        count = len(bodies.numbers)
 
-        def block(
-            surface: AnySurface, u: Any, E_star: Any, hardness: Any, *others: Any
-        ) -> tuple[Any, ...]:
-            return function(
-                self.theory_of(bodies.at(E_star, hardness)), surface, u, E_star, *others
-            )
+        def block(surface: AnySurface, u: Any, *others: Any) -> tuple[Any, ...]:
+            own = bodies.at(*others[:count])
+            theory = self.theory_of(own)
+            return function(theory, surface, u, own.E_star, *others[count:])
 
         if any_labelled(self.surface, *arrays.values()):
             labelled: tuple[Any, ...] = apply_to_surface(

@@ -256,6 +256,10 @@ class Theory(abc.ABC):
         """
         return self.interval(surface, quantity)
 
+    def highest(self, surface: AnySurface) -> FloatArray:
+        """Mean separation of first contact [length], where contact ends: h_max, of surfaces that did not yield."""
+        return np.asarray(surface.h_max, dtype=float)
+
     def domain(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] between which the theory answers.
 

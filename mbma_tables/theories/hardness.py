@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.theories.base import Theory
 
 
-def with_hardness(theory: Theory, hardness: ArrayLike, E_star: ArrayLike = 1.0) -> Theory:
+def with_hardness(
+    theory: Theory,
+    hardness: ArrayLike,
+    E_star: ArrayLike = 1.0,
+    largest_pressure: ArrayLike | None = None,
+) -> Theory:
     """The theory of bodies whose pressure cannot exceed a hardness.
 
     Parameters
@@ -18,6 +25,9 @@ def with_hardness(theory: Theory, hardness: ArrayLike, E_star: ArrayLike = 1.0) 
     hardness : array_like
         Largest pressure p_m that the softer body supports, positive, in the unit of
         `E_star`; where it is infinite, nothing yields.
+    largest_pressure : array_like, optional
+        Nominal pressure that was the largest so far, in the unit of `E_star`: below it the
+        theory is that of unloading and reloading. Default: that of first loading.
     E_star : array_like
         Effective modulus; if it is 1, the hardness is over E*.
 
@@ -41,11 +51,18 @@ def with_hardness(theory: Theory, hardness: ArrayLike, E_star: ArrayLike = 1.0) 
     # beyond the largest number nothing yields
     with np.errstate(over="ignore"):
         hardness_over_E_star = np.asarray(hardness, dtype=float) / E_star
-    # both modules import scipy, which takes long and which elastic contacts do without
+    # all modules import scipy, which takes long and which elastic contacts do without
+    loading: Any
     if theory.presses_anew:
         from mbma_tables.theories.simulated.yielded import Saturated
 
-        return Saturated(theory, hardness_over_E_star)
-    from mbma_tables.theories.yielding.theory import Yielding
+        loading = Saturated(theory, hardness_over_E_star)
+    else:
+        from mbma_tables.theories.yielding.theory import Yielding
 
-    return Yielding(theory, hardness_over_E_star)
+        loading = Yielding(theory, hardness_over_E_star)
+    if largest_pressure is None:
+        return loading
+    from mbma_tables.theories.yielding.unloading import Unloading
+
+    return Unloading(loading, np.asarray(largest_pressure, dtype=float) / E_star)

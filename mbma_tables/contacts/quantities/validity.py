@@ -36,7 +36,8 @@ def reasons_with_masks(
     """The reasons that apply anywhere, with their masks as plain arrays."""
     surface = contact.surface
     bodies = contact.bodies
-    fields = [contact.mean_separation, bodies.E_star, bodies.hardness, *more.values()]
+    own = bodies.numbers.values()
+    fields = [contact.mean_separation, *own, *more.values()]
     if any_labelled(surface, *fields):
         import xarray as xr
 
@@ -46,9 +47,9 @@ def reasons_with_masks(
         fields = plain[: len(fields)]
         if numbers_of_surface:
             surface = surface.with_numbers(*plain[len(fields) :])
-    u, E_star, hardness, *others = map(np.asarray, fields)
-    theory = contact.theory_of(bodies.at(E_star, hardness))
-    masks = reasons(theory, surface, u, E_star, *others)
+    u, *others = map(np.asarray, fields)
+    one = bodies.at(*others[: len(own)])
+    masks = reasons(contact.theory_of(one), surface, u, one.E_star, *others[len(own) :])
     return {reason: mask for reason, mask in masks.items() if mask.any()}
 
 

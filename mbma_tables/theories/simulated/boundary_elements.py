@@ -6,6 +6,8 @@ cycle. A map that its mirror images continue is solved by cosine transforms on i
 points. Loading only, frictionless.
 """
 
+from __future__ import annotations
+
 import time
 from typing import Any
 
@@ -43,6 +45,7 @@ CORRECTION = (np.pi - 1 + np.log(2)) / 24  # Yastrebov, Anciaux, Molinari 2017
 # yielded area's own boundary
 MIXED = 0.8
 YIELDED = 0.65
+YIELDING = 1 - 1e-9  # of the hardness, from which a point counts as yielded
 
 
 def waves(values: FloatArray, mirrored: bool = False) -> FloatArray:
@@ -215,7 +218,7 @@ class Contact:
         p = self.traction
         rest = self._rest
         touching = p > 0
-        yielded = p >= self.cap * (1 - 1e-9)
+        yielded = p >= self.cap * YIELDING
         elastic = touching & ~yielded
         held = self._beside(touching)
         hard = self._beside(yielded)
@@ -251,6 +254,23 @@ class Contact:
     def gap(self) -> FloatArray:
         """Gaps of the last load, zero in contact, yielded points flattened."""
         return np.where(self.traction > 0, 0.0, np.maximum(self._rest, 0))
+
+    def residual_heights(self) -> FloatArray:
+        """Heights [length] of the map after the last load is taken off; of mean below zero where points yielded.
+
+        What yielded points overlap the other body by stays (Almqvist, Sahlin, Larsson,
+        Glavatskih 2007).
+        """
+        yielded = self.traction >= self.cap * YIELDING
+        return self.surface + np.where(yielded, np.minimum(self._rest, 0.0), 0.0)
+
+    def unloading(self) -> Contact:
+        """The elastic contact of the map as the last load left it, under that load."""
+        after = Contact(
+            self.residual_heights(), self.sizes, self.tolerance, mirrored=self.mirrored
+        )
+        after.pressure = self.traction.copy()
+        return after
 
     def frozen_stiffness(self) -> float:
         """-dF/du of the contact area as it is, sticking neither to yielding nor to opening [E*/length].
