@@ -5,6 +5,7 @@ points overlap the other body by stays, and the map so flattened is unloaded ela
 """
 
 import dataclasses
+import gzip
 import pathlib
 from typing import Any, cast
 
@@ -16,9 +17,10 @@ from generate.boundary_elements import run as campaigns
 from generate.boundary_elements.solve import load_at
 from generate.boundary_elements.surfaces import Recipe, Task
 from generate.boundary_elements.surfaces import heights as random_heights
-from generate.files import DATA, to_csv
+from generate.files import DATA, read_csv, to_csv
 from generate.machined.makers import Part
 from generate.machined.makers import heights as machined_heights
+from generate.unloading_fit import report
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file
 from mbma_tables.surfaces.bearing_curve import bearing
@@ -30,13 +32,27 @@ PEAKS = (0.003, 0.012, 0.05, 0.15, 0.3, 0.5)
 FRACTIONS = (1.0, 0.9, 0.75, 0.5, 0.3, 0.2, 0.1, 0.03, 0.01)
 FEWEST = 12  # points in contact, below which a contact is not pressed
 ELASTIC_LOADS = 12
-INDICES = (2.5, 8.0, 1.6, 16.0, 4.0, 1.2, 30.0)  # psi = E* g/p_m, in the order of the runs
+INDICES = (
+    2.5,
+    8.0,
+    1.6,
+    16.0,
+    4.0,
+    1.2,
+    30.0,
+)  # psi = E* g/p_m, in the order of the runs
 HURSTS = (0.8, 0.5, 0.3, 1.0, 0.65, 0.2, 0.9)
 # zeta_1, longest wavelengths and grid points a side
 BANDS = ((12.5, 4, 320), (8.0, 4, 256), (16.0, 2, 256), (10.0, 3, 256), (8.0, 6, 384))
 MACHINED = ("ground", "honed", "turned")
 GROUPS = 147  # of random surfaces
-REFINED = (8, 16, 22, 37, 60)  # turns whose surface is solved on a grid twice as fine, too
+REFINED = (
+    8,
+    16,
+    22,
+    37,
+    60,
+)  # turns whose surface is solved on a grid twice as fine, too
 FILE = DATA / "unloading.csv.gz"
 HEAD = """\
 # Contacts loaded to p0 with pressures capped at a hardness and unloaded elastically, by python -m generate unloading.
@@ -140,6 +156,18 @@ def row(
     }
 
 
+def described(group: Group) -> dict[str, Any]:
+    """Columns of a group."""
+    surface = group.surface
+    if isinstance(surface, Part):
+        own = {"family": surface.family, "hurst": np.nan, "zeta_1": np.nan}
+        own |= {"waves": 0, "seed": surface.number}
+    else:
+        own = {"family": surface.kind, "hurst": surface.hurst, "zeta_1": surface.zeta_1}
+        own |= {"waves": surface.waves, "seed": surface.seed}
+    return own | {"points": surface.points, "psi": group.psi}
+
+
 def gathered(folder: pathlib.Path) -> pd.DataFrame:
     """Rows of the groups that are solved."""
     frames = []
@@ -148,17 +176,7 @@ def gathered(folder: pathlib.Path) -> pd.DataFrame:
         if path.exists():
             with np.load(path, allow_pickle=False) as content:
                 frame = pd.DataFrame(dict(content))
-            surface = group.surface
-            machined = isinstance(surface, Part)
-            own = {
-                "family": surface.family if machined else surface.kind,
-                "hurst": np.nan if machined else surface.hurst,
-                "zeta_1": np.nan if machined else surface.zeta_1,
-                "waves": 0 if machined else surface.waves,
-                "seed": surface.number if machined else surface.seed,
-                "points": surface.points,
-                "psi": group.psi,
-            }
+            own = described(group)
             frames.append(frame.assign(**own)[[*own, *frame.columns]])
     return pd.concat(frames, ignore_index=True)
 
@@ -174,20 +192,24 @@ def gathered(folder: pathlib.Path) -> pd.DataFrame:
 @click.option(
     "--collect", is_flag=True, help="Write what there is into docs/data, no runs."
 )
+@click.option("--fit", is_flag=True, help="Fit the law to what docs/data has, no runs.")
 @click.option(
     "--out", type=click.Path(path_type=pathlib.Path), default=FILE, show_default=True
 )
-def unloading(folder: pathlib.Path, collect: bool, out: pathlib.Path) -> None:
+def unloading(folder: pathlib.Path, collect: bool, fit: bool, out: pathlib.Path) -> None:
     """Unload contacts that yielded, by boundary elements: an hour or two on one core.
 
     Stopped and called again, it goes on where it was.
     """
+    if fit:
+        click.echo(report(read_csv(out)))
+        return
     if not collect:
         tasks = [Task(cast(Recipe, group), "") for group in groups()]
         campaigns.run(tasks, folder, 1, solved)
         return
     frame = gathered(folder)
-    write_file(out, to_csv(HEAD, frame, "%.6g"))
+    write_file(out, gzip.compress(to_csv(HEAD, frame, "%.4g"), mtime=0))
     click.echo(f"{out}: {len(frame)} contacts")
 
 

@@ -147,9 +147,10 @@ def contact_of(
     )
     question = Question.of(in_units.units, candidates)
     setup = Setup(surface, in_units, resolve(theory, surface, question.name), interface)
-    if any_labelled(surface, question.value, *in_units.numbers.values()):
+    numbers = in_units.E_star, in_units.hardness, in_units.largest
+    if any_labelled(surface, question.value, *numbers):
         return _of_labelled(setup, question)
-    solved, gaps = _solved(setup, surface, question, *in_units.numbers.values())
+    solved, gaps = _solved(setup, surface, question, *numbers)
     values = {
         "pressure": solved.pressure,
         "area": solved.area,
@@ -201,7 +202,9 @@ def _separations(
     cap: FloatArray,
 ) -> Gaps:
     """Both separations for the given quantity."""
-    h_max = theory.highest(surface)
+    h_max = np.asarray(surface.h_max)
+    if setup.bodies.largest is not None:
+        h_max = theory.highest(surface)
     name = question.name
     gap = question.value
     is_gap = name in GAPS

@@ -50,11 +50,15 @@ if TYPE_CHECKING:
     from mbma_tables.contacts.quantities.leakage import Leakage
     from mbma_tables.theories.yielding.theory import Loaded
 
-# what yields depends on the heaviest load before: none is assumed, also where pressures of
-# one request fall
+# what yields depends on the heaviest load before: without one none is assumed, also where
+# pressures of one request fall
 FIRST_LOADING = "first; each pressure is reached from no contact"
+AFTER = "after a largest pressure of {}, below which contacts unload and reload"
 MOST_SHOWN = 1000  # entries up to which the text includes errors, scatter and validity
-OF_FALLING = ", also where a smaller one follows a larger one: that is no unloading"
+OF_FALLING = (
+    ", also where a smaller one follows a larger one: that is no unloading, for which "
+    "largest_pressure is"
+)
 # labels of panels whose quantities do not end in it
 PANELS = {"area": "real contact area  A/A0", "mean_separation": "mean gap"}
 CURVES = ("mean_separation", "pressure", "area")
@@ -205,7 +209,7 @@ class Contact(State, Displayed):
             d, u = both_separations(
                 gap,
                 self._values[gap],
-                self.surface.h_max,
+                self._highest,
                 self.elastic_theory.ends_at_h_max,
             )
             return {"separation": d, "mean_separation": u}[name]
@@ -315,7 +319,29 @@ class Contact(State, Displayed):
     @property
     def last_contact(self) -> Any:
         """Mean separation of last contact; infinite where the theory has none."""
-        return self.surface.h_max if self.elastic_theory.ends_at_h_max else np.inf
+        return self._highest if self.elastic_theory.ends_at_h_max else np.inf
+
+    @property
+    def _highest(self) -> Any:
+        """Mean separation of first contact: h_max, after a larger pressure that of the residual shape."""
+        if self.bodies.largest is None or not self.yields:
+            return self.surface.h_max
+        return self.evaluate(
+            lambda theory, surface, u, E_star: (theory.highest(surface) + 0 * u,)
+        )[0]
+
+    def unloading(self) -> Contact:
+        """The contact as it unloads from here, with its own pressure as the largest so far if it is."""
+        if not self.yields:
+            return self
+        largest = self.pressure
+        if self.bodies.largest is not None:
+            largest = np.maximum(largest, self.bodies.largest)
+        bodies = dataclasses.replace(self.bodies, largest=largest)
+        setup = dataclasses.replace(self._setup, bodies=bodies)
+        # of the theory, also where this is a contact of a law
+        near = Contact(setup, {"mean_separation": self.mean_separation})
+        return Contact(setup, {"mean_separation": near.separation_at(self.pressure)})
 
     @functools.cached_property
     def leakage(self) -> Leakage:
@@ -332,8 +358,7 @@ class Contact(State, Displayed):
         Parameters
         ----------
         friction : float, optional
-            Coefficient of friction, for slip; by default that of the joint. With a hardness
-            only full stick is known.
+            Coefficient of friction, for slip; by default that of the joint.
         direction : {"along", "across"}, optional
             Of the shear relative to the lay, for surfaces whose anisotropy is known and
             above 1.4: full stick alone.
@@ -510,6 +535,8 @@ class Contact(State, Displayed):
         """How the pressures are reached, of contacts that yield, for texts; empty of elastic ones."""
         if not self.yields:
             return ""
+        if self.bodies.largest is not None:
+            return AFTER.format(shown(self.bodies.largest, self.units["pressure"]))
         pressures = np.asarray(self.pressure)
         falling = pressures.ndim > 0 and bool((np.diff(pressures, axis=-1) < 0).any())
         return FIRST_LOADING + (OF_FALLING if falling else "")

@@ -573,7 +573,7 @@ class Joint(JointQuantities, Displayed):
         if self._is_labelled or self.shape == ():
             return in_units
         modulus = spread(np.asarray(in_units.E_star), self.shape)
-        return in_units.at(modulus, in_units.hardness)
+        return dataclasses.replace(in_units, E_star=modulus)
 
     def _spread(self, name: str, value: Any) -> Any:
         """A gap, pressure or area in the units of the joint, for a batch in its shape.

@@ -129,6 +129,7 @@ class Theory(abc.ABC):
     # what answers are beyond its table of islands, where it has one: one of `OUTSIDE` of MBMA
     outside = "raise"
     rtol = 1e-8  # relative error that its laws aim at
+    least_rtol = 0.0  # relative error below which its laws do not aim without being asked
     looks = LOOKS  # initial gaps of an inversion, for one surface
     looks_of_batch = FEW_LOOKS  # and for each of a batch
     reached = 0.0  # relative amount by which a wanted value may exceed the largest

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -52,7 +50,7 @@ def with_hardness(
     with np.errstate(over="ignore"):
         hardness_over_E_star = np.asarray(hardness, dtype=float) / E_star
     # all modules import scipy, which takes long and which elastic contacts do without
-    loading: Any
+    loading: Theory
     if theory.presses_anew:
         from mbma_tables.theories.simulated.yielded import Saturated
 

@@ -40,7 +40,9 @@ class LawContact(Contact):
 
     def quantity(self, name: str) -> Any:
         """A quantity by its name; error, energy and unloading stiffness are the law's."""
-        if name in OF_LAWS and name not in self._values:
+        # a law has the work of loading, not the energy that a yielded contact gives back
+        of_law = name in OF_LAWS and not (name == "energy" and self.yields)
+        if of_law and name not in self._values:
             if name == "error":
                 value = self._law.error + 0.0 * self.area
             else:

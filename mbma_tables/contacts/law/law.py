@@ -555,10 +555,29 @@ class ContactLaw(Law, LawQuantities, Displayed):
         question = self._asked(mean_separation, separation, pressure, area)
         law, factor = self.unloading()
         # the law of the elastic contact has other pressures at this gap
-        d = question.value if question.is_gap else self.separations_of(question)
-        name = question.name if question.is_gap else "separation"
-        stiffness: Numbers = factor * law.values_of(("stiffness",), Question(name, d))[0]
+        gaps = question
+        if not question.is_gap:
+            gaps = Question("separation", self.separations_of(question))
+        u = self.both_separations(gaps.name, gaps.value)[1]
+        before = np.asarray(u) >= self.largest_before
+        if np.all(before):
+            return self.values_of(("stiffness",), gaps)[0]  # type: ignore[no-any-return]
+        first = u if is_labelled(u) else np.where(before, self.largest_before, u)
+        mean = Question("mean_separation", first)
+        stiffness: Numbers = factor * law.values_of(("stiffness",), mean)[0]
+        if np.any(before):
+            own = self.values_of(("stiffness",), gaps)[0]
+            stiffness = np.where(before, own, stiffness)[()]
         return stiffness
+
+    @functools.cached_property
+    def largest_before(self) -> float:
+        """Mean separation under the largest pressure so far, from which on the law is that of unloading; infinite without one."""
+        if self.setup.bodies.largest is None:
+            return math.inf
+        theory: Any = self.setup.theory_of(self.setup.bodies)
+        peak = getattr(theory, "peak", None)
+        return math.inf if peak is None else float(peak(self.surface).mean_separation)
 
     def unloading(self) -> tuple[ContactLaw, float]:
         """The law of the elastic contact, and `unloading_stiffness` over its stiffness."""

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbma_tables.bodies.bodies import Bodies, BodiesInUnits
+from mbma_tables.bodies.bodies import Bodies, BodiesInUnits, after, checked_largest
 from mbma_tables.common.arguments import FloatArray, checked_hardness, hinted, number_in
 from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.common.shared import frozen
@@ -43,6 +43,7 @@ def contact_law(
     bodies: Bodies | float | str = 1.0,
     theory: str | Theory | UserTheory | None = None,
     *,
+    largest_pressure: float | str | None = None,
     rtol: float | None = None,
 ) -> ContactLaw:
     """Pressure and area of one surface as functions of its gap, for many gaps and for inverses.
@@ -53,11 +54,15 @@ def contact_law(
         One surface, not a batch.
     bodies : Bodies or float or str
         The bodies in contact, as for `contact`, each constant one number. With a hardness
-        it is the law of first loading, which has no `energy`.
+        it is the law of first loading, which has no `energy`, unless a largest pressure is
+        given.
     theory : str or theory, optional
         As for `contact`; by default "simulated" for a resolved map, else "calibrated". The
         law covers the gaps that the theory answers: with ``Mbma(outside="exact")`` also
         those whose islands no table covers.
+    largest_pressure : float or str, optional
+        The largest pressure so far, with a hardness: below it the law is that of unloading
+        and reloading, above it that of first loading.
     rtol : float, optional
         Requested relative error of the polynomials against the theory (MBMA's island
         model), in [1e-9, 0.1]; for other theories not below a tenth of their own error (its
@@ -88,6 +93,8 @@ def contact_law(
     >>> f"{persson.pressure(2.0):.4g}, {persson.at_pressure(1e-4).mean_separation:.3f}"
     '0.0001832, 2.276'
     """
+    if largest_pressure is not None:
+        bodies = after(Bodies.of(bodies), largest_pressure)
     return law_of(surface, bodies, theory, rtol)
 
 
@@ -106,17 +113,21 @@ def law_of(
     )
     modulus = number_in("E_star", given.E_star, sys.float_info.min, sys.float_info.max)
     hardness = checked_hardness(given.hardness)
-    if hardness.ndim:
-        raise InputError(
-            f"hardness must be one number, got shape {hardness.shape}: a law is of one surface"
-        )
+    largest = None if given.largest is None else checked_largest(given.largest)
+    for name, number in (("hardness", hardness), ("largest_pressure", largest)):
+        if number is not None and number.ndim:
+            raise InputError(
+                f"{name} must be one number, got shape {number.shape}: a law is of one surface"
+            )
     given.require_one_conductivity()
     one = _one_surface(surface)
     chosen = resolve(theory, surface)
-    asked = max(chosen.rtol, MIN_LAW_RTOL) if rtol is None else rtol
-    tolerance = number_in("rtol", asked, MIN_LAW_RTOL, MAX_RTOL)
-    setup = Setup(one, given.at(modulus, float(hardness)), chosen, interface)
+    before = None if largest is None else float(largest)
+    setup = Setup(one, given.at(modulus, float(hardness), before), chosen, interface)
     loading = setup.theory_of(setup.bodies)
+    least = max(chosen.rtol, MIN_LAW_RTOL, loading.least_rtol)
+    asked = least if rtol is None else rtol
+    tolerance = number_in("rtol", asked, MIN_LAW_RTOL, MAX_RTOL)
     return _law_of_theory(setup, loading, tolerance)
 
 
@@ -184,7 +195,7 @@ def _law_of_curves(setup: Setup, curves: Compression, tolerance: float) -> Conta
         answer_errors=[np.array([curves.error])],
         leverage=curves.leverage,
     )
-    return _fitted_law(fitting, tolerance, setup)
+    return _fitted_law(fitting, tolerance, setup, h_max)
 
 
 def theory_law(setup: Setup, theory: Theory, rtol: float) -> ContactLaw:
@@ -194,7 +205,7 @@ def theory_law(setup: Setup, theory: Theory, rtol: float) -> ContactLaw:
     bound.
     """
     surface: Any = setup.surface
-    h_max = float(surface.h_max)
+    h_max = float(theory.highest(surface))
     lowest, highest, ends_at_h_max = _covered(surface, theory)
     answer_errors: list[FloatArray] = []
 
@@ -237,12 +248,12 @@ def theory_law(setup: Setup, theory: Theory, rtol: float) -> ContactLaw:
         leverage=0.0,
     )
     try:
-        return _fitted_law(fitting, tolerance, setup)
+        return _fitted_law(fitting, tolerance, setup, h_max)
     except ConvergenceError:
         # answers need not be smooth below their own error
         if error_of_answers <= tolerance:
             raise
-        return _fitted_law(fitting, error_of_answers, setup)
+        return _fitted_law(fitting, error_of_answers, setup, h_max)
 
 
 def _covered(surface: AnySurface, theory: Theory) -> tuple[float, float, bool]:
@@ -251,7 +262,7 @@ def _covered(surface: AnySurface, theory: Theory) -> tuple[float, float, bool]:
     # the logarithm of u
     shares = LOWEST if theory.elastic is theory else LOWEST[1:]
     lowest = _lowest(surface, theory.elastic, shares)
-    h_max = float(surface.h_max)
+    h_max = float(theory.highest(surface))
     if theory.ends_at_h_max and np.isinf(theory.domain(surface)[1]):
         return lowest, h_max, True
     return lowest, min(float(theory.interval(surface)[1]), MAX_SPAN * h_max), False
@@ -266,7 +277,7 @@ def _sides(
     tolerance: float,
 ) -> tuple[float, list[fit.Side], fit.First]:
     """Mean separation over which x rises to 1; the sides of a law; the record where x begins."""
-    h_max = float(surface.h_max)
+    h_max = float(theory.highest(surface))
     lowest, highest = covered
     bends = np.asarray(theory.bends(surface), dtype=float)
     if not ends_at_h_max:
@@ -303,9 +314,10 @@ def _sides(
     return width, [above._replace(start=start)], first
 
 
-def _fitted_law(fitting: _Fitting, tolerance: float, setup: Setup) -> ContactLaw:
+def _fitted_law(
+    fitting: _Fitting, tolerance: float, setup: Setup, h_max: float
+) -> ContactLaw:
     """Fit the sides, put the block together, and look for turning points."""
-    h_max = float(setup.surface.h_max)
     scale = fitting.scale
     lowest, highest = fitting.limits
     sides: list[fit.Side] = []

@@ -90,7 +90,7 @@ class ContactQuantities:
 
     @property
     def energy(self) -> Numbers:
-        """Elastic energy per nominal area [stress length], the integral of F/A0 over u; of elastic contacts alone."""
+        """Elastic energy per nominal area [stress length] that unloading gives back, the integral of F/A0 over u."""
         value: Numbers = self.quantity("energy")
         return value
 
@@ -661,7 +661,7 @@ class JointQuantities:
         return value
 
     def energy(self: Any, pressure: ArrayLike | str) -> Numbers:
-        """Elastic energy per nominal area [stress length], the integral of F/A0 over u; of elastic contacts alone."""
+        """Elastic energy per nominal area [stress length] that unloading gives back, the integral of F/A0 over u."""
         value: Numbers = self.at_pressure(pressure).quantity("energy")
         return value
 

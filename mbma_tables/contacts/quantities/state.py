@@ -106,5 +106,9 @@ class State(ContactQuantities, abc.ABC):
         """Mean separation of last contact; infinite where the theory has none."""
 
     @abc.abstractmethod
+    def unloading(self) -> State:
+        """The contact as it unloads from here; itself where nothing yields."""
+
+    @abc.abstractmethod
     def is_valid(self) -> Any:
         """Where no reason against the contact applies."""

@@ -13,13 +13,10 @@ from mbma_tables.contacts.quantities.tangential import tangential_ratio_of
 STIFFNESS = Dimension(stress=1, length=-1)
 ENERGY = Dimension(stress=1, length=1)
 
-# of contacts and of their laws
+# of laws
 ENERGY_OF_YIELDED = (
-    "the energy that a yielded contact gives back is not known, since its residual "
-    "shape is not; unloading_stiffness is the initial stiffness of unloading"
-)
-NO_HARDNESS = Need(
-    "an elastic contact", lambda contact: not contact.yields, ENERGY_OF_YIELDED
+    "the integral of the pressure of a law with a hardness is the work of loading, of which "
+    "yielded points give back a part: at(...).energy has what a contact gives back"
 )
 
 POISSONS_RATIO = Need(
@@ -66,14 +63,12 @@ def tangential_stiffness(contact: State) -> Any:
 
 @quantity(
     ENERGY,
-    "elastic energy per nominal area",
+    "elastic energy per nominal area, which unloading gives back",
     uncertainty="scatter",
     error_sign=0,
-    needs=(NO_HARDNESS,),
     is_column=False,
 )
 def energy(contact: State) -> Any:
-    """Elastic energy per nominal area [stress length], the integral of F/A0 over u; of elastic contacts alone."""
-    return contact.evaluate(
-        lambda theory, surface, u, E_star: (E_star * theory.energy(surface, u),)
-    )[0]
+    """Elastic energy per nominal area [stress length] that unloading gives back, the integral of F/A0 over u."""
+    unloading = contact.unloading()
+    return unloading.energy_at(unloading.mean_separation)

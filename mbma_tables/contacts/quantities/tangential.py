@@ -24,7 +24,6 @@ from mbma_tables.contacts.quantities.lay import stress_shares
 if TYPE_CHECKING:
     from mbma_tables.contacts.quantities.state import State
 
-OF_YIELDING = "slip of a contact that yields is not known: its normal law is for loading only; `stiffness` of full stick is known"
 OF_LAY = "slip of a surface with a lay was not compared with simulations; `stiffness` of full stick is known"
 DIRECTIONS = ("along", "across")
 ISOTROPIC = 1.4  # anisotropy up to which the isotropic ratio is taken
@@ -63,7 +62,8 @@ class Tangential:
         energy of a cycle 8 times the integral of tau to its amplitude, less 4 tau delta (Masing 1926)
 
     Partial slip is the difference of two normal contacts (M. Ciavarella, J. Mech. Phys.
-    Solids 46 (1998) 2391), for isotropic bodies whose normal pressures do not move them
+    Solids 46 (1998) 2391), with a hardness of those of unloading from this one, whose
+    yielded points stay flat; for isotropic bodies whose normal pressures do not move them
     tangentially: nu = 0, or alike bodies nearly so.
     """
 
@@ -93,7 +93,7 @@ class Tangential:
         Raises
         ------
         InputError, OutOfRangeError
-            Without a friction, with a hardness, and for negative displacements.
+            Without a friction, and for negative displacements.
         """
         normal, friction = self._slipping()
         delta = self._checked("displacement", displacement)
@@ -195,18 +195,17 @@ def sheared(
     """A contact under shear, with the joint's friction and direction where they are not given."""
     direction = contact.interface.direction if direction is None else direction
     ratio = tangential_ratio_of(contact, direction)
-    normal: State | str = contact
-    if contact.yields:
-        normal = OF_YIELDING
-    elif direction is not None:
-        normal = OF_LAY
+    # shear takes pressure off in Ciavarella's superposition, which yielded points resist
+    # elastically
+    unloading = contact if direction is not None else contact.unloading()
+    normal: State | str = unloading if direction is None else OF_LAY
     return Tangential(
         ratio=ratio,
         friction=contact.interface.friction if friction is None else friction,
         pressure=contact.pressure,
-        mean_separation=contact.mean_separation,
+        mean_separation=unloading.mean_separation,
         stiffness=contact.unloading_stiffness / ratio,
-        last=contact.last_contact,
+        last=unloading.last_contact,
         units=contact.unit_system,
         _normal=normal,
     )

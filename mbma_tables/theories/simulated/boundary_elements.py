@@ -262,7 +262,8 @@ class Contact:
         Glavatskih 2007).
         """
         yielded = self.traction >= self.cap * YIELDING
-        return self.surface + np.where(yielded, np.minimum(self._rest, 0.0), 0.0)
+        overlap = np.where(yielded, np.minimum(self._rest, 0.0), 0.0)
+        return np.asarray(self.surface + overlap)
 
     def unloading(self) -> Contact:
         """The elastic contact of the map as the last load left it, under that load."""

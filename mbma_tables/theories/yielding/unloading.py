@@ -15,7 +15,6 @@ Without yielding w is 0, and the contact goes back the way it came.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -27,49 +26,124 @@ from scipy.special import beta, betainc
 from mbma_tables.common.arguments import FloatArray, require
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.theories.base import Gaps, Solved, Theory, TheoryAnswer, select, solved_by
+from mbma_tables.theories.base import (
+    Gaps,
+    Solved,
+    Theory,
+    TheoryAnswer,
+    select,
+    solved_by,
+)
 from mbma_tables.theories.yielding.theory import Yielding
 
+# pressure over the largest, below which force is a power of the distance to last contact:
+# the elastic contact at such forces is within rounding of its last contact
+LEAST = 1e-10
 # pressure over the rms gradient that stands for a largest one that is not needed
 ANY_PRESSURE = 1e-3
 
 
-@dataclasses.dataclass(frozen=True)
-class Constants:
-    """The law's constants, fitted to boundary elements by `python -m generate unloading --fit`."""
+# standard deviations of ln(law/boundary elements) on groups of surfaces that the fit left out,
+# of ratios to those at p0: by pressures over p0, and by shares of the area that yielded
+FRACTIONS = (0.01, 0.03, 0.1, 0.2, 0.3, 0.5, 0.75, 0.9, 1.0)
+SHARES = (0.2, 0.65, 0.97)
+SCATTER: dict[str, tuple[tuple[float, ...], ...]] = {
+    "stiffness": (
+        (0.237, 0.181, 0.083, 0.052, 0.046, 0.054, 0.039, 0.021, 0.000),
+        (0.252, 0.221, 0.167, 0.104, 0.081, 0.067, 0.045, 0.021, 0.000),
+        (0.363, 0.308, 0.203, 0.148, 0.114, 0.063, 0.039, 0.014, 0.000),
+    ),
+    "area": (
+        (0.153, 0.143, 0.072, 0.042, 0.043, 0.051, 0.029, 0.016, 0.000),
+        (0.175, 0.121, 0.083, 0.073, 0.053, 0.041, 0.049, 0.024, 0.000),
+        (0.153, 0.120, 0.075, 0.059, 0.050, 0.032, 0.019, 0.014, 0.000),
+    ),
+    "lift": (
+        (0.060, 0.041, 0.030, 0.032, 0.034, 0.035, 0.035, 0.034, 0.034),
+        (0.071, 0.077, 0.058, 0.050, 0.046, 0.040, 0.029, 0.018, 0.018),
+        (0.137, 0.113, 0.080, 0.056, 0.044, 0.033, 0.017, 0.007, 0.007),
+    ),
+}
+SOFTEST = (
+    0.033  # hardness over E* times the rms gradient, of the softest that was unloaded
+)
+ROUNDING = 1e-9
+HALVINGS = 50
 
-    weight: float = 1.2  # power of y in w
-    power: float = 1.75  # a and b of flattened spots,
-    exponent: float = 0.8
-    area_weight: float = 0.6  # power of y in v
-    area_power: float = 2.2  # c and d of flattened spots
-    area_exponent: float = 0.77
+
+def ratio_scatter(quantity: str, s: FloatArray, yielded: FloatArray) -> FloatArray:
+    """Standard deviation of ln of "stiffness", "area" or "lift" over what it is at the largest pressure."""
+    log_s = np.log(np.clip(s, FRACTIONS[0], 1.0))
+    rows = [np.interp(log_s, np.log(FRACTIONS), row) for row in SCATTER[quantity]]
+    place = np.interp(yielded, SHARES, range(len(SHARES)))
+    below = np.clip(place.astype(int), 0, len(SHARES) - 2)
+    stacked = np.stack(np.broadcast_arrays(*rows))
+    shape = np.broadcast_shapes(stacked.shape[1:], below.shape)
+    stacked = np.broadcast_to(stacked, (len(SHARES), *shape))
+    index = np.broadcast_to(below, shape)[None]
+    low, high = (np.take_along_axis(stacked, index + k, 0)[0] for k in (0, 1))
+    return np.asarray(low + (high - low) * (place - below))
 
 
-CONSTANTS = Constants()
+class Spots(NamedTuple):
+    """Weight of flattened spots, and a and b of [1 - (1-s)^a]^b, as they depend on a contact.
+
+    With y the share of the area that yielded and l = ln(A0/AREA), the contact area at p0
+    within `AREAS`: ::
+
+        w = y^weight
+        a = 1 + exp(power + power_elastic (1-y) + power_area l)
+        b = 1/(1 + exp(-(exponent + exponent_elastic (1-y) + exponent_area l)))
+    """
+
+    weight: float
+    power: float
+    power_elastic: float
+    power_area: float
+    exponent: float
+    exponent_elastic: float
+    exponent_area: float
+
+    def of(
+        self, yielded: FloatArray, area: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """w, a and b."""
+        load = np.log(np.clip(area, *AREAS) / AREA)
+        rest = 1 - yielded
+        steep = self.power + self.power_elastic * rest + self.power_area * load
+        logit = self.exponent + self.exponent_elastic * rest + self.exponent_area * load
+        return yielded**self.weight, 1 + np.exp(steep), 1 / (1 + np.exp(-logit))
 
 
-def flattened(s: FloatArray, power: float, exponent: float) -> FloatArray:
+AREA = 0.05
+AREAS = (0.003, 0.5)
+# fitted to boundary elements by `python -m generate unloading --fit`
+STIFFNESS = Spots(1.130, -0.381, -2.736, -0.157, 1.397, -2.641, 0.148)
+CONTACT = Spots(1.062, 0.320, -1.239, -0.002, 1.446, -2.575, -0.121)
+
+
+def flattened(s: FloatArray, power: Any, exponent: Any) -> FloatArray:
     """[1 - (1-s)^a]^b, a stiffness or an area of flattened spots over that at s = 1."""
     return np.asarray((1 - (1 - s) ** power) ** exponent)
 
 
-def lift(s: FloatArray, power: float, exponent: float) -> FloatArray:
+def lift(s: FloatArray, power: Any, exponent: Any) -> FloatArray:
     """Integral of 1/`flattened` from s to 1."""
     return _moment(s, power, exponent, 1)
 
 
-def energy(s: FloatArray, power: float, exponent: float) -> FloatArray:
+def energy(s: FloatArray, power: Any, exponent: Any) -> FloatArray:
     """Integral of t/`flattened` over t from 0 to s."""
     parts = [_moment(end, power, exponent, order) for order in (1, 2) for end in (0.0, s)]
     return np.asarray(parts[0] - parts[1] - parts[2] + parts[3])
 
 
-def _moment(s: ArrayLike, power: float, exponent: float, order: int) -> FloatArray:
+def _moment(s: ArrayLike, power: Any, exponent: Any, order: int) -> FloatArray:
     """Integral of (1-t)^(order - 1)/`flattened` over t from s to 1."""
-    first = order / power
-    whole = beta(first, 1 - exponent) / power
-    return np.asarray(whole * betainc(first, 1 - exponent, (1 - np.asarray(s)) ** power))
+    first = order / np.asarray(power)
+    last = 1 - np.asarray(exponent)
+    whole = beta(first, last) / power
+    return np.asarray(whole * betainc(first, last, (1 - np.asarray(s)) ** power))
 
 
 class Peak(NamedTuple):
@@ -77,36 +151,47 @@ class Peak(NamedTuple):
 
     pressure: FloatArray
     mean_separation: FloatArray
-    area: FloatArray
+    loading: TheoryAnswer
     stiffness: FloatArray  # at constant contact area
     yielded: FloatArray  # share of the area
     flattening: FloatArray  # u less the gap of the mean planes
+    remembered: Any  # mask of entries that yielded; others are those of first loading
+    # w, a and b of the stiffness and of the area
+    spots: tuple[FloatArray, FloatArray, FloatArray]
+    area_spots: tuple[FloatArray, FloatArray, FloatArray]
     # of the elastic contact at the same pressure
     elastic: TheoryAnswer
     elastic_separation: FloatArray
 
     @property
-    def remembered(self) -> Any:
-        """Mask of entries that yielded."""
-        return np.isfinite(self.mean_separation)
-
-    @property
-    def weight(self) -> FloatArray:
-        return np.asarray(self.yielded**CONSTANTS.weight)
-
-    @property
-    def area_weight(self) -> FloatArray:
-        return np.asarray(self.yielded**CONSTANTS.area_weight)
+    def area(self) -> FloatArray:
+        """A/A0."""
+        return self.loading.area
 
     def separation(self, elastic_separation: FloatArray, s: FloatArray) -> FloatArray:
         """Mean separation where that of the elastic contact at the same pressure is known."""
-        c = CONSTANTS
+        weight, *powers = self.spots
         moved = elastic_separation - self.elastic_separation
-        spots = lift(s, c.power, c.exponent) * self.pressure
-        compliance = (1 - self.weight) * moved * self.elastic.stiffness
-        return np.asarray(
-            self.mean_separation + (compliance + self.weight * spots) / self.stiffness
-        )
+        flat = weight * lift(s, *powers) * self.pressure
+        elastic = (1 - weight) * moved * self.elastic.stiffness
+        return np.asarray(self.mean_separation + (elastic + flat) / self.stiffness)
+
+
+class Tail(NamedTuple):
+    """The lightest contacts, of which force and area are one power of the distance to last contact."""
+
+    first: FloatArray  # mean separation where they begin,
+    elastic_separation: FloatArray  # that of the elastic contact at the same force,
+    last: FloatArray  # and where contact ends
+    pressure: FloatArray  # over A0 E*, at `first`
+    area: FloatArray
+    power: FloatArray
+
+    def left(self, mean_separation: FloatArray) -> FloatArray:
+        """Share of the distance from `first` to last contact that is left."""
+        distance = self.last - self.first
+        share = (self.last - mean_separation) / np.where(distance > 0, distance, 1.0)
+        return np.asarray(np.clip(share, 0.0, 1.0))
 
 
 class Unloaded(NamedTuple):
@@ -129,6 +214,8 @@ class Unloading(Theory):
         The largest pressure over E*; 0 where there was none.
     """
 
+    # near the largest pressure the branch is no polynomial: 1 - K/K0 goes as (1-s)^a
+    least_rtol = 1e-4
     elastic: Any = None
 
     def __init__(self, loading: Yielding, largest: ArrayLike) -> None:
@@ -136,15 +223,14 @@ class Unloading(Theory):
         self.largest = np.asarray(largest, dtype=float)
         self.elastic, self.hardness = loading.elastic, loading.hardness
         self.name, self.ends_at_h_max = loading.name, loading.ends_at_h_max
-        self._bound: tuple[Any, Any] = None, None
+        self._bound: tuple[Any, Any, Any] = None, None, None
 
     def at(self, shape: tuple[int, ...], place: Any) -> Theory:
-        chosen = np.asarray(place).astype(np.intp)
-        largest = self.largest
-        if largest.ndim:
-            largest = np.broadcast_to(largest, shape).ravel()[chosen]
         loading: Any = self.loading.at(shape, place)
-        return type(self)(loading, largest)
+        if self.largest.ndim == 0:
+            return self if loading is self.loading else type(self)(loading, self.largest)
+        chosen = np.broadcast_to(self.largest, shape).ravel()
+        return type(self)(loading, chosen[np.asarray(place).astype(np.intp)])
 
     def provenance(self) -> tuple[str, ...]:
         return self.loading.provenance()
@@ -161,21 +247,28 @@ class Unloading(Theory):
         return (self.largest > 0) & np.isfinite(self.hardness)
 
     def peak(self, surface: AnySurface) -> Peak:
-        """The contact under the largest pressure, calculated once for a surface.
-
-        Its mean separation is infinite where nothing yielded: all contacts are then those of
-        first loading.
-        """
-        if self._bound[0] is not surface:
-            self._bound = surface, self._peak(surface)
-        found: Peak = self._bound[1]
+        """The contact under the largest pressure, calculated once for a surface."""
+        found: Peak = self._curve(surface)[0]
         return found
+
+    def tail(self, surface: AnySurface) -> Tail:
+        """The lightest contacts, calculated once for a surface."""
+        found: Tail = self._curve(surface)[1]
+        return found
+
+    def _curve(self, surface: AnySurface) -> tuple[Peak, Tail]:
+        if self._bound[0] is not surface:
+            peak = self._peak(surface)
+            self._bound = surface, peak, self._tail(surface, peak)
+        return self._bound[1], self._bound[2]
 
     def _peak(self, surface: AnySurface) -> Peak:
         loading = self.loading
         over = self.largest > self.hardness
         if over.any():
-            raise OutOfRangeError("the largest pressure must be at most the hardness", over)
+            raise OutOfRangeError(
+                "the largest pressure must be at most the hardness", over
+            )
         gradient = np.asarray(surface.rms_gradient)
         small = np.minimum(ANY_PRESSURE * gradient, ANY_PRESSURE * self.hardness)
         pressure = np.where(self._loaded_before, self.largest, small)
@@ -185,57 +278,66 @@ class Unloading(Theory):
         yielded = np.where(self._loaded_before, loaded.yielded, 0.0)
         return Peak(
             pressure,
-            np.where(yielded > 0, u, np.inf),
-            loaded.answer.area,
+            u,
+            loaded.answer,
             loaded.unloading_stiffness,
             yielded,
             u - loaded.plane_separation,
+            yielded > 0,
+            STIFFNESS.of(yielded, loaded.answer.area),
+            CONTACT.of(yielded, loaded.answer.area),
             self.elastic.answer(surface, v),
             v,
         )
 
-    def _ends(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
-        """Mean separations of the elastic contact and of this one, where contact ends."""
-        peak = self.peak(surface)
-        last = self.loading.interval(surface)[1]
-        force = self.elastic.answer(surface, last).pressure
-        return last, peak.separation(last, np.minimum(force / peak.pressure, 1.0))
+    def _tail(self, surface: AnySurface, peak: Peak) -> Tail:
+        elastic = self.elastic
+        pressure = LEAST * peak.pressure
+        v = elastic.mean_separation_at(surface, "pressure", pressure)
+        first = peak.separation(v, np.asarray(LEAST))
+        last = first
+        if self.ends_at_h_max:
+            end = np.asarray(surface.h_max, dtype=float)
+            last = peak.separation(end, np.asarray(0.0))
+        branch = self._branch(surface, peak, v, first).answer
+        power = np.where(last > first, branch.stiffness * (last - first) / pressure, 1.0)
+        return Tail(first, v, last, branch.pressure, branch.area, power)
 
     def highest(self, surface: AnySurface) -> FloatArray:
         """Mean separation of first contact with the residual shape [length]."""
         if not self.ends_at_h_max:
             return super().highest(surface)
-        own = self._ends(surface)[1]
-        return np.where(self.peak(surface).remembered, own, super().highest(surface))
+        last = self.tail(surface).last
+        return np.where(self.peak(surface).remembered, last, super().highest(surface))
 
     def interval(
         self, surface: AnySurface, quantity: str = "pressure"
     ) -> tuple[FloatArray, FloatArray]:
         low, high = self.loading.interval(surface, quantity)
         remembered = self.peak(surface).remembered
-        return low, np.where(remembered, self._ends(surface)[1], high)
+        return low, np.where(remembered, self.tail(surface).last, high)
 
     def domain(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
         low, high = self.loading.domain(surface)
         return low, high if self.ends_at_h_max else self.interval(surface)[1]
 
     def bends(self, surface: AnySurface) -> FloatArray:
-        """Mean separations at which the branches meet, and where the elastic theory bends."""
-        peak = self.peak(surface)
-        at_loading = np.asarray(self.loading.bends(surface))
-        elastic = np.asarray(self.elastic.bends(surface))
+        """Mean separation at which the branches meet, and that of one bend more, if there is any."""
+        peak, tail = self._curve(surface)
+        bends = np.asarray(self.loading.bends(surface))
         if surface.shape or not peak.remembered.all():
-            return at_loading
-        met = peak.mean_separation[None]
-        on_branch = elastic[elastic > peak.elastic_separation]
-        s = self.elastic.answer(surface, on_branch).pressure / peak.pressure
-        return np.concatenate(
-            [
-                at_loading[at_loading < peak.mean_separation],
-                np.asarray(met),
-                peak.separation(on_branch, s),
-            ]
-        )
+            return bends
+        met = np.reshape(peak.mean_separation, 1)
+        bends = bends[bends < met]
+        elastic = np.asarray(self.elastic.bends(surface))
+        elastic = elastic[elastic > peak.elastic_separation]
+        if elastic.size:
+            s = self.elastic.answer(surface, elastic).pressure / peak.pressure
+            bends = np.concatenate([bends, peak.separation(elastic, s)])
+        if self.ends_at_h_max:
+            bends = np.concatenate([bends, np.reshape(tail.first, 1)])
+        # laws have two bends at most
+        return np.concatenate([met, bends[:1]])
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         answer: TheoryAnswer = self.loaded(surface, mean_separation).answer
@@ -251,11 +353,12 @@ class Unloading(Theory):
         """Contacts at mean separations u [length]; `lighter` are those of the elastic contact at the same forces."""
         u = np.asarray(mean_separation, dtype=float)
         peak = self.peak(surface)
-        below = u >= peak.mean_separation
-        deepest = np.minimum(u, peak.mean_separation)
+        below = peak.remembered & (u >= peak.mean_separation)
+        deepest = np.where(below, peak.mean_separation, u)
         first = self.loading.loaded(surface, deepest)
         v = self._elastic_separation(surface, u) if lighter is None else lighter
         branch = self._branch(surface, peak, np.maximum(v, peak.elastic_separation), u)
+        branch = self._light(surface, branch, u)
         fields = [
             np.where(below, one, other)
             for one, other in zip(branch.answer, first.answer, strict=True)
@@ -273,33 +376,59 @@ class Unloading(Theory):
         self, surface: AnySurface, peak: Peak, v: FloatArray, u: FloatArray
     ) -> Unloaded:
         """Contacts of the branch, by mean separations v of the elastic contact at the same forces."""
-        c = CONSTANTS
         elastic = self.elastic.answer(surface, v)
         s = np.minimum(elastic.pressure / peak.pressure, 1.0)
-        compliance = (1 - peak.weight) * peak.elastic.stiffness / elastic.stiffness
-        compliance = compliance + peak.weight / flattened(s, c.power, c.exponent)
+        weight, *powers = peak.spots
+        compliance = (1 - weight) * peak.elastic.stiffness / elastic.stiffness
+        compliance = compliance + weight / flattened(s, *powers)
         stiffness = np.where(s > 0, peak.stiffness / compliance, 0.0)
-        spots = flattened(s, c.area_power, c.area_exponent)
-        shrunk = elastic.area / peak.elastic.area
-        area = peak.area * shrunk ** (1 - peak.area_weight) * spots**peak.area_weight
+        weight, *powers = peak.area_spots
+        shrunk = (elastic.area / peak.elastic.area) ** (1 - weight)
+        area = peak.area * shrunk * flattened(s, *powers) ** weight
         error = 2 * elastic.error
-        answer = TheoryAnswer(s * peak.pressure, np.where(s > 0, area, 0.0), stiffness, error)
+        answer = TheoryAnswer(
+            s * peak.pressure, np.where(s > 0, area, 0.0), stiffness, error
+        )
         yielded = np.where(s > 0, peak.yielded, 0.0)
         return Unloaded(answer, yielded, stiffness, u - peak.flattening)
 
+    @np.errstate(divide="ignore", invalid="ignore", over="ignore")
+    def _light(self, surface: AnySurface, branch: Unloaded, u: FloatArray) -> Unloaded:
+        """The branch with its lightest contacts."""
+        tail = self.tail(surface)
+        light = u > tail.first
+        share = tail.left(u) ** tail.power
+        pressure = tail.pressure * share
+        stiffness = np.where(share > 0, tail.power * pressure / (tail.last - u), 0.0)
+        lighter = TheoryAnswer(
+            pressure, tail.area * share, stiffness, branch.answer.error
+        )
+        fields = [
+            np.where(light, one, other)
+            for one, other in zip(lighter, branch.answer, strict=True)
+        ]
+        answer = TheoryAnswer(*fields)
+        touching = answer.pressure > 0
+        return branch._replace(
+            answer=answer,
+            yielded=np.where(touching, self.peak(surface).yielded, 0.0),
+            unloading_stiffness=answer.stiffness,
+        )
+
     def _elastic_separation(self, surface: AnySurface, u: FloatArray) -> FloatArray:
-        """Mean separations of the elastic contact at the forces of contacts at u."""
-        peak = self.peak(surface)
-        last, own_last = self._ends(surface)
-        shape = np.broadcast_shapes(u.shape, np.shape(last), np.shape(own_last))
-        first = np.broadcast_to(peak.elastic_separation, shape)
-        wanted = np.clip(u, peak.mean_separation, own_last)
-        wanted = np.broadcast_to(np.where(peak.remembered, wanted, -np.inf), shape)
+        """Mean separations of the elastic contact at the forces of contacts at u, but the lightest."""
+        peak, tail = self._curve(surface)
+        shape = np.broadcast_shapes(u.shape, np.shape(tail.first))
+        low = np.broadcast_to(peak.elastic_separation, shape)
+        high = np.broadcast_to(tail.elastic_separation, shape)
+        wanted = np.broadcast_to(
+            np.where(peak.remembered, u, peak.mean_separation), shape
+        )
 
         def missed(v: FloatArray, place: FloatArray) -> FloatArray:
             part: Any = self.at(shape, place)
             own = select(surface, shape, place)
-            whole = own is surface and part.largest.ndim == 0
+            whole = own is surface and part is self
             peak_of_part = peak if whole else part.peak(own)
             force = part.elastic.answer(own, v).pressure
             s = np.minimum(force / peak_of_part.pressure, 1.0)
@@ -307,19 +436,25 @@ class Unloading(Theory):
             return np.asarray(peak_of_part.separation(v, s) - goal)
 
         place = np.arange(float(wanted.size)).reshape(shape)
-        inside = np.isfinite(wanted) & (wanted > peak.mean_separation) & (wanted < own_last)
-        bracket = first, np.broadcast_to(np.where(inside, last, first), shape)
+        inside = (wanted > peak.mean_separation) & (wanted < tail.first)
+        bracket = low, np.where(inside, high, low)
         found = find_root(missed, bracket, args=(place,)).x
-        ends = np.where(wanted >= own_last, last, first)
+        ends = np.where(wanted >= tail.first, high, low)
         return np.where(inside, found, ends)
 
-    def at_force(self, surface: AnySurface, pressure: FloatArray) -> tuple[FloatArray, Any]:
+    def at_force(
+        self, surface: AnySurface, pressure: FloatArray
+    ) -> tuple[FloatArray, Any]:
         """Mean separations u at forces over A0 E*, and those of the elastic contact."""
         peak = self.peak(surface)
         heavy = (pressure >= peak.pressure) | ~peak.remembered
         v = self.elastic.mean_separation_at(surface, "pressure", pressure)
         s = np.minimum(pressure / peak.pressure, 1.0)
-        u = peak.separation(v, s)
+        tail = self.tail(surface)
+        with np.errstate(divide="ignore"):
+            share = (s / LEAST) ** (1 / tail.power)
+        light = tail.last - (tail.last - tail.first) * share
+        u = np.where(s < LEAST, light, peak.separation(v, s))
         if heavy.any():
             at_least = np.where(heavy, pressure, peak.pressure)
             u = np.where(heavy, self.loading.at_force(surface, at_least)[0], u)
@@ -340,19 +475,104 @@ class Unloading(Theory):
             return u, np.zeros(u.shape, bool)
         return super().inverted(surface, quantity, wanted)
 
+    def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
+        """That of first loading at the largest pressure, with that of the branch from there.
+
+        "stiffness" is that of reloading, which is the unloading stiffness.
+        """
+        peak = self.peak(surface)
+        on_branch = peak.remembered & (area < peak.area)
+        loading = self.loading.scatter(surface, quantity, np.asarray(area, dtype=float))
+        if not on_branch.any():
+            return loading
+        shape = np.broadcast_shapes(np.shape(area), np.shape(peak.area), surface.shape)
+        s = self._pressure_ratio(peak, np.broadcast_to(area, shape))
+        if quantity == "pressure":
+            branch = self._pressure_scatter(surface, peak, s)
+        else:
+            name = "area" if quantity == "area" else "stiffness"
+            asked = quantity if quantity == "area" else "unloading_stiffness"
+            first = self.loading.scatter(surface, asked, peak.area)
+            branch = np.hypot(first, ratio_scatter(name, s, peak.yielded))
+        return np.where(on_branch, branch, loading)
+
+    def _pressure_ratio(self, peak: Peak, area: FloatArray) -> FloatArray:
+        """p/p0 at contact areas, as for an elastic area in proportion to the pressure."""
+        weight, *powers = peak.area_spots
+        low = np.full(area.shape, np.log(FRACTIONS[0]))
+        high = np.zeros(area.shape)
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            s = np.exp(middle)
+            larger = (
+                s ** (1 - weight) * flattened(s, *powers) ** weight > area / peak.area
+            )
+            low, high = np.where(larger, low, middle), np.where(larger, middle, high)
+        return np.asarray(np.exp(low))
+
+    @np.errstate(divide="ignore", invalid="ignore")
+    def _pressure_scatter(
+        self, surface: AnySurface, peak: Peak, s: FloatArray
+    ) -> FloatArray:
+        """Standard deviation of ln of the pressure at a mean separation."""
+        pressure = s * peak.pressure
+        v = self.elastic.mean_separation_at(surface, "pressure", pressure)
+        u = peak.separation(v, s)
+        stiffness = self._branch(surface, peak, v, u).answer.stiffness
+        at_peak = self.loading.scatter(surface, "pressure", peak.area)
+        first = at_peak * peak.pressure / peak.loading.stiffness
+        lifted = (u - peak.mean_separation) * ratio_scatter("lift", s, peak.yielded)
+        return np.asarray(np.hypot(first, lifted) * stiffness / pressure)
+
+    def reasons(
+        self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray
+    ) -> Mapping[str, Any]:
+        """Those of first loading, on the branch at the largest pressure; and pressures far below it."""
+        peak = self.peak(surface)
+        shape = np.shape(answer.pressure)
+        below = peak.remembered & (mean_separation >= peak.mean_separation)
+        branch = np.broadcast_to(below, shape)
+        fields = [
+            np.where(branch, one, other)
+            for one, other in zip(peak.loading, answer, strict=True)
+        ]
+        u = np.where(branch, peak.mean_separation, mean_separation)
+        reasons = dict(self.loading.reasons(surface, TheoryAnswer(*fields), u))
+        least, most = AREAS
+        area = f"A/A0 at the largest pressure is outside {least:g} to {most:g}, where unloading was simulated"
+        outside = (peak.area < least * (1 - ROUNDING)) | (peak.area > most)
+        light = answer.pressure < FRACTIONS[0] * peak.pressure * (1 - ROUNDING)
+        eta = np.asarray(self.hardness) / np.asarray(surface.rms_gradient)
+        own = {
+            area: outside,
+            f"the pressure is below {FRACTIONS[0]:g} of the largest one": light,
+            f"unloading was simulated from {SOFTEST:g} on of the hardness over E* times "
+            "the rms gradient": eta < SOFTEST,
+        }
+        return reasons | {
+            text: branch & mask & (answer.pressure > 0) for text, mask in own.items()
+        }
+
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Energy over A0 E* [length] that unloading gives back, at most that at the largest pressure."""
-        c = CONSTANTS
         u = np.asarray(mean_separation, dtype=float)
         peak = self.peak(surface)
+        unloads = ~peak.remembered | (u >= peak.mean_separation * (1 - ROUNDING))
         require(
             "mean_separation",
-            u,
-            np.broadcast_to(u >= peak.mean_separation * (1 - 1e-9), u.shape),
+            np.broadcast_to(u, np.shape(unloads)),
+            unloads,
             "at least that under the largest pressure, above which the contact yields",
         )
         v = np.maximum(self._elastic_separation(surface, u), peak.elastic_separation)
         s = np.minimum(self.elastic.answer(surface, v).pressure / peak.pressure, 1.0)
-        spots = peak.pressure**2 * energy(s, c.power, c.exponent)
-        elastic = self.elastic.energy(surface, v) * peak.elastic.stiffness
-        return ((1 - peak.weight) * elastic + peak.weight * spots) / peak.stiffness
+        tail = self.tail(surface)
+        s = np.where(u > tail.first, s * tail.left(u) ** tail.power, s)
+        weight, *powers = peak.spots
+        flat = weight * peak.pressure**2 * energy(s, *powers)
+        elastic = (1 - weight) * self.elastic.energy(surface, v) * peak.elastic.stiffness
+        found = np.asarray((elastic + flat) / peak.stiffness)
+        if np.all(peak.remembered):
+            return found
+        first = np.where(peak.remembered, self.loading.interval(surface)[1], u)
+        return np.where(peak.remembered, found, self.elastic.energy(surface, first))

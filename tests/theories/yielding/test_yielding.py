@@ -105,8 +105,10 @@ def test_pressure_is_inverted_and_slopes_are_those_of_the_curve(theory):
     )
     assert (found.unloading_stiffness > found.stiffness).all()
     assert (found.plane_separation <= found.mean_separation).all()
-    with pytest.raises(InputError, match="gives back is not known"):
-        _ = found.energy
+    # what comes back is more than that of a linear spring as stiff as the first unloading
+    assert (
+        found.energy[kept] > (found.pressure**2 / found.unloading_stiffness / 2)[kept]
+    ).all()
 
 
 @pytest.mark.parametrize(

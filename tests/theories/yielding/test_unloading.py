@@ -1,0 +1,209 @@
+"""Contacts that yielded, below their largest pressure: limits, consistency, and refusals."""
+
+import pickle
+
+import numpy as np
+import pytest
+import xarray as xr
+from helpers import random_map
+from scipy.integrate import quad
+
+from mbma_tables import (
+    Bodies,
+    InputError,
+    OutOfRangeError,
+    Surface,
+    contact,
+    contact_law,
+)
+from mbma_tables.surfaces.bearing_curve import bearing
+from mbma_tables.theories import THEORIES
+from mbma_tables.theories.simulated.boundary_elements import Contact
+
+FACE = Surface(hurst=0.8, q0=0.06, q1=2.0, h_rms=1.0, h_max=3.5, unit="um")
+BODIES = Bodies("100 GPa", hardness="5 GPa", conductivity="45 W/(m K)", nu=0.3)
+LARGEST = "100 MPa"
+PRESSURES = ["2 MPa", "10 MPa", "50 MPa", "99 MPa"]
+each = pytest.mark.parametrize("theory", THEORIES)
+
+
+def unloaded(pressure=None, theory="calibrated", bodies=BODIES, **given):
+    given = {"largest_pressure": LARGEST, "theory": theory} | given
+    return contact(FACE, bodies, pressure=pressure, **given)
+
+
+@each
+def test_the_branch_meets_first_loading_at_the_largest_pressure(theory):
+    first = contact(FACE, BODIES, pressure=LARGEST, theory=theory)
+    pressed = unloaded(LARGEST, theory)
+    names = ("mean_separation", "plane_separation", "area", "yielded")
+    for name in (*names, "unloading_stiffness", "energy", "solid_conductance"):
+        assert pressed.quantity(name) == pytest.approx(first.quantity(name), rel=1e-9)
+    near = unloaded("99.9999 MPa", theory)
+    for name in (*names, "unloading_stiffness"):
+        assert near.quantity(name) == pytest.approx(first.quantity(name), rel=2e-4)
+
+
+@each
+def test_heavier_contacts_are_those_of_first_loading(theory):
+    first = contact(FACE, BODIES, pressure=["150 MPa", "300 MPa"], theory=theory)
+    pressed = unloaded(["150 MPa", "300 MPa"], theory)
+    for name in ("mean_separation", "area", "stiffness", "unloading_stiffness", "valid"):
+        np.testing.assert_array_equal(pressed.quantity(name), first.quantity(name))
+
+
+@each
+def test_without_yielding_a_contact_goes_back_the_way_it_came(theory):
+    elastic = contact(FACE, Bodies("100 GPa"), pressure=PRESSURES, theory=theory)
+    for hardness in (np.inf, [np.inf] * 4):
+        bodies = Bodies("100 GPa", hardness=hardness)
+        pressed = unloaded(PRESSURES, theory, bodies)
+        for name in ("mean_separation", "area", "stiffness", "energy"):
+            np.testing.assert_array_equal(pressed.quantity(name), elastic.quantity(name))
+
+
+def test_it_goes_over_into_the_elastic_contact_as_the_hardness_grows():
+    elastic = contact(FACE, Bodies("100 GPa"), pressure=PRESSURES, theory="calibrated")
+    missed = []
+    for hardness in (10.0, 40.0, 80.0, 300.0):
+        pressed = unloaded(PRESSURES, bodies=Bodies("100 GPa", hardness=hardness))
+        ratio = pressed.stiffness / elastic.stiffness
+        missed.append(float(np.abs(np.log(ratio)).max()))
+    assert np.all(np.diff(missed) < 0)
+    assert missed[-1] < 1e-3
+
+
+@each
+def test_stiffness_and_energy_are_those_of_the_pressure(theory):
+    pressed = unloaded(["5 MPa", "50 MPa"], theory)
+    for u, stiffness, energy in zip(
+        pressed.mean_separation, pressed.stiffness, pressed.energy, strict=True
+    ):
+        step = 1e-5 * u
+        sides = unloaded(theory=theory, mean_separation=[u - step, u + step]).pressure
+        assert -np.diff(sides)[0] / (2 * step) == pytest.approx(stiffness, rel=1e-4)
+
+        def pressure(x):
+            return unloaded(theory=theory, mean_separation=x).pressure
+
+        last = min(float(np.max(pressed.last_contact)), u + 20)
+        if np.isfinite(pressed.last_contact).all():
+            work, _ = quad(pressure, u, last, epsrel=1e-6, epsabs=0, limit=40)
+            assert energy == pytest.approx(work, rel=1e-4)
+
+
+@each
+def test_gaps_pressures_and_areas_answer_the_same_contact(theory):
+    pressed = unloaded(PRESSURES, theory)
+    for name in ("mean_separation", "area", "separation"):
+        value = pressed.quantity(name)
+        again = contact(
+            FACE, BODIES, **{name: value}, largest_pressure=LARGEST, theory=theory
+        )
+        np.testing.assert_allclose(again.pressure, pressed.pressure, rtol=1e-6)
+
+
+def test_a_yielded_contact_is_stiffer_and_larger_than_one_of_first_loading():
+    first = contact(FACE, BODIES, pressure=PRESSURES, theory="calibrated")
+    pressed = unloaded(PRESSURES)
+    assert (pressed.area > first.area).all()
+    assert (pressed.mean_separation < first.mean_separation).all()
+    assert (pressed.solid_conductance > first.solid_conductance).all()
+    apart = unloaded("0 MPa")
+    assert (apart.area, apart.stiffness) == (0.0, 0.0)
+    assert apart.mean_separation == pytest.approx(float(apart.last_contact), rel=1e-12)
+    beyond = unloaded(mean_separation=apart.mean_separation * 1.01)
+    assert (beyond.pressure, beyond.area, beyond.yielded) == (0.0, 0.0, 0.0)
+
+
+def test_largest_pressures_broadcast_with_all_else():
+    largest = np.array([[0.0], [0.05], [0.1]])
+    pressures = np.array([0.01, 0.05, 0.2])
+    hardness = np.array([5.0, np.inf, 2.0])
+    bodies = Bodies("100 GPa", hardness=hardness)
+    many = unloaded(pressures, bodies=bodies, largest_pressure=largest)
+    for place in np.ndindex(3, 3):
+        one = Bodies("100 GPa", hardness=hardness[place[1]])
+        alone = unloaded(
+            pressures[place[1]], bodies=one, largest_pressure=largest[place[0], 0]
+        )
+        for name in ("mean_separation", "area", "stiffness", "energy", "yielded"):
+            assert many.quantity(name)[place] == pytest.approx(
+                alone.quantity(name), rel=1e-9
+            )
+    gaps = unloaded(
+        mean_separation=many.mean_separation, bodies=bodies, largest_pressure=largest
+    )
+    np.testing.assert_allclose(gaps.pressure, many.pressure, rtol=1e-8)
+    labelled = unloaded(
+        xr.DataArray(pressures, dims="load"),
+        largest_pressure=xr.DataArray([0.05, 0.1], dims="peak"),
+    )
+    assert dict(labelled.area.sizes) == {"load": 3, "peak": 2}
+    assert float(labelled.area[0, 1]) == pytest.approx(
+        unloaded(0.01, largest_pressure=0.1).area, rel=1e-12
+    )
+    assert bool(labelled.valid.all())
+
+
+@pytest.mark.parametrize("theory", ["calibrated", "mbma", "persson"])
+def test_a_law_of_unloading_is_the_contacts(theory):
+    law = contact_law(FACE, BODIES, theory, largest_pressure=LARGEST)
+    law = pickle.loads(pickle.dumps(law))
+    pressed = unloaded(PRESSURES, theory)
+    own = law.at_pressure(PRESSURES)
+    for name in ("mean_separation", "separation", "area", "stiffness", "energy"):
+        np.testing.assert_allclose(
+            own.quantity(name), pressed.quantity(name), rtol=2 * law.error + 1e-4
+        )
+    first = contact(FACE, BODIES, pressure="200 MPa", theory=theory)
+    heavy = law.at_pressure("200 MPa")
+    assert heavy.unloading_stiffness == pytest.approx(first.unloading_stiffness, rel=1e-3)
+    np.testing.assert_allclose(
+        law.unloading_stiffness(own.mean_separation), own.stiffness, rtol=1e-9
+    )
+
+
+def test_residual_heights_hold_the_load_that_made_them():
+    """The flattened map bears the same pressures elastically, over the same gaps, and less beyond."""
+    heights = random_map(64, 0.05, 0.2)
+    heights = heights / bearing(heights, (64.0, 64.0)).gradient
+    loaded = Contact(heights, (64.0, 64.0), hardness=0.25)
+    found = loaded.press(0.02)
+    after = loaded.unloading()
+    again = after.press(0.02)
+    np.testing.assert_allclose(after.traction, loaded.traction, atol=1e-4)
+    assert again["mean_separation"] == pytest.approx(found["mean_separation"], rel=1e-3)
+    flattened = loaded.residual_heights() < loaded.surface
+    assert 0.01 < flattened.mean() < 0.2
+    assert (loaded.traction[flattened] >= 0.25 * (1 - 1e-9)).all()
+    virgin = Contact(heights, (64.0, 64.0), hardness=0.25)
+    assert after.press(0.005)["area"] > 1.5 * virgin.press(0.005)["area"]
+
+
+def test_what_is_wrong_is_refused():
+    with pytest.raises(
+        OutOfRangeError, match="largest pressure must be at most the hard"
+    ):
+        unloaded("1 MPa", largest_pressure="6 GPa")
+    for wrong, words in ((-1.0, "largest_pressure"), (np.nan, "finite"), ("3 um", "um")):
+        with pytest.raises(InputError, match=words):
+            unloaded("1 MPa", largest_pressure=wrong)
+    after = Bodies("100 GPa", hardness="5 GPa", largest_pressure="50 MPa")
+    with pytest.raises(InputError, match="largest_pressure is given twice"):
+        unloaded("1 MPa", bodies=after)
+    assert contact(FACE, after, pressure="1 MPa", theory="calibrated").area == (
+        unloaded("1 MPa", largest_pressure="50 MPa").area
+    )
+    with pytest.raises(InputError, match="largest_pressure must be one number"):
+        contact_law(FACE, BODIES, "calibrated", largest_pressure=[0.1, 0.2])
+
+
+def test_contacts_unlike_those_simulated_are_not_valid():
+    valid = unloaded(["0.5 MPa", "2 MPa", "200 MPa", "2 GPa"])
+    assert valid.valid.tolist() == [False, True, True, False]
+    assert "below 0.01 of the largest" in "".join(valid.reasons)
+    near = unloaded("10 MPa", largest_pressure="2 GPa")
+    assert not near.valid
+    assert "third of the hardness" in "".join(near.reasons)
+    assert "after a largest pressure of 0.1 GPa" in repr(valid)
