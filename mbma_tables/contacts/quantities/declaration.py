@@ -30,6 +30,11 @@ def of_yielding_contacts(state: State) -> bool:
     return state.yields
 
 
+def of_elastic_contacts(state: State) -> bool:
+    """Whether a quantity is listed: of contacts without a hardness, since others take several answers for it."""
+    return not state.yields
+
+
 @dataclasses.dataclass(frozen=True)
 class Quantity:
     """Declaration of a quantity, all that anyone who shows it needs to know."""

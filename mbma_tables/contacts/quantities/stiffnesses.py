@@ -4,6 +4,7 @@ from typing import Any
 
 from mbma_tables.common.units import Dimension
 from mbma_tables.contacts.quantities.declaration import (
+    of_elastic_contacts,
     of_yielding_contacts,
     quantity,
 )
@@ -67,6 +68,7 @@ def tangential_stiffness(contact: State) -> Any:
     uncertainty="scatter",
     error_sign=0,
     is_column=False,
+    is_listed=of_elastic_contacts,
 )
 def energy(contact: State) -> Any:
     """Elastic energy per nominal area [stress length] that unloading gives back, the integral of F/A0 over u."""
