@@ -168,6 +168,17 @@ class Peak(NamedTuple):
         """A/A0."""
         return self.loading.area
 
+    def at(self, shape: tuple[int, ...], place: Any) -> Peak:
+        """The entries at flat indices of a broadcast shape."""
+
+        def chosen(value: Any) -> Any:
+            if isinstance(value, tuple):
+                parts = [chosen(part) for part in value]
+                return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+            return np.broadcast_to(value, shape).ravel()[place]
+
+        return Peak(*map(chosen, self))
+
     def separation(self, elastic_separation: FloatArray, s: FloatArray) -> FloatArray:
         """Mean separation where that of the elastic contact at the same pressure is known."""
         weight, *powers = self.spots
@@ -426,14 +437,12 @@ class Unloading(Theory):
         )
 
         def missed(v: FloatArray, place: FloatArray) -> FloatArray:
-            part: Any = self.at(shape, place)
-            own = select(surface, shape, place)
-            whole = own is surface and part is self
-            peak_of_part = peak if whole else part.peak(own)
-            force = part.elastic.answer(own, v).pressure
-            s = np.minimum(force / peak_of_part.pressure, 1.0)
-            goal = wanted.ravel()[place.astype(np.intp)]
-            return np.asarray(peak_of_part.separation(v, s) - goal)
+            chosen = place.astype(np.intp)
+            part = self.elastic.at(shape, chosen)
+            own_peak = peak.at(shape, chosen)
+            force = part.answer(select(surface, shape, chosen), v).pressure
+            s = np.minimum(force / own_peak.pressure, 1.0)
+            return np.asarray(own_peak.separation(v, s) - wanted.ravel()[chosen])
 
         place = np.arange(float(wanted.size)).reshape(shape)
         inside = (wanted > peak.mean_separation) & (wanted < tail.first)
