@@ -52,6 +52,10 @@ FUNCTIONS = (
     "mbma_surface_spectrum_of",
     "mbma_spectrum_contact_of",
     "mbma_spectrum_separation_of",
+    "mbma_bearing_shares",
+    "mbma_yielding_forces",
+    "mbma_yielding_areas",
+    "mbma_frozen_factors",
 )
 LAW_FUNCTIONS = (
     "mbma_law_open",

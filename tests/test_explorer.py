@@ -327,8 +327,12 @@ def test_a_hardness_is_that_of_the_library(visit, against, hardness):
     expected |= {"solid_conductance": 50 / 1e-3 / 13.3 * known.unloading_stiffness}
     expected |= {"tangential_stiffness": known.tangential_stiffness}
     for name, values in expected.items():
+        # the area alone is at the elastic separation of a force, which the page iterates to 1e-7
         np.testing.assert_allclose(
-            found[f"calibrated {name}"][seen], values, rtol=1e-5, err_msg=name
+            found[f"calibrated {name}"][seen],
+            values,
+            rtol=1e-6 if name == "area" else 1e-11,
+            err_msg=name,
         )
     assert "Python library" in tab.inner_text("#concerns")
     # the road's spectrum is within the tested range, and only the hardness is not judged

@@ -904,6 +904,58 @@ static bool do_gap_flow(const argument *a, long long *answer) {
     return true;
 }
 
+/* ---- yielding.c ---- */
+
+static bool do_gaussian_levels(const argument *a, long long *answer) {
+    enum { GAP, LEVEL };
+    *answer = (long long)mbma_gaussian_levels(a[GAP].count, a[GAP].items, a[LEVEL].items);
+    return true;
+}
+
+static bool do_bearing_shares(const argument *a, long long *answer) {
+    enum { GAP, LAST, SHARE, SLOPE };
+    *answer = (long long)mbma_bearing_shares(a[GAP].count, a[GAP].items, a[LAST].items,
+                                             a[SHARE].items, a[SLOPE].items);
+    return true;
+}
+
+static bool do_diffused(const argument *a, long long *answer) {
+    enum { X, TAU, SIGN, SHARE };
+    *answer = (long long)mbma_diffused(a[X].count, a[X].items, a[TAU].items, a[SIGN].real,
+                                       a[SHARE].items);
+    return true;
+}
+
+static bool do_yielding_forces(const argument *a, long long *answer) {
+    enum { ELASTIC, STIFFNESS, SHARE, SLOPE, ETA, LAW, FORCE, STEEP };
+    *answer = (long long)mbma_yielding_forces(
+        a[ELASTIC].count, a[ELASTIC].items, a[STIFFNESS].items, a[SHARE].items, a[SLOPE].items,
+        a[ETA].items, a[LAW].items, a[FORCE].items, a[STEEP].items);
+    return true;
+}
+
+static bool do_yielding_areas(const argument *a, long long *answer) {
+    enum { FORCE, ELASTIC, ETA, LAW, YIELDED, AREA };
+    *answer = (long long)mbma_yielding_areas(a[FORCE].count, a[FORCE].items, a[ELASTIC].items,
+                                             a[ETA].items, a[LAW].items, a[YIELDED].whole != 0,
+                                             a[AREA].items);
+    return true;
+}
+
+static bool do_frozen_factors(const argument *a, long long *answer) {
+    enum { ETA, LAW, FACTOR };
+    *answer = (long long)mbma_frozen_factors(a[ETA].count, a[ETA].items, a[LAW].items,
+                                             a[FACTOR].items);
+    return true;
+}
+
+static bool do_yielding_planes(const argument *a, long long *answer) {
+    enum { GAP, LOAD, ETA, LAW, PLANES };
+    *answer = (long long)mbma_yielding_planes(a[GAP].count, a[GAP].items, a[LOAD].items,
+                                              a[ETA].items, a[LAW].items, a[PLANES].items);
+    return true;
+}
+
 /* ---- all functions ---- */
 
 /* Names of the functions `do_...`, which return whether the sizes and numbers of their arguments
@@ -954,6 +1006,13 @@ static bool do_gap_flow(const argument *a, long long *answer) {
     FN(spectra_of, "Dn Dn D D7 " INNER "w w") \
     FN(spectra_contact, SPECTRA "Ln Dn wn wn wn") \
     FN(spectra_separation, SPECTRA "Ln Dn wn") \
-    FN(gap_flow, "D D D7 " INNER "D2 D Ln Dn wn")
+    FN(gap_flow, "D D D7 " INNER "D2 D Ln Dn wn") \
+    FN(gaussian_levels, "Dn wn") \
+    FN(bearing_shares, "Dn Dn wn wn") \
+    FN(diffused, "Dn Dn d wn") \
+    FN(yielding_forces, "Dn Dn Dn Dn Dn D11 wn wn") \
+    FN(yielding_areas, "Dn Dn Dn D11 i wn") \
+    FN(frozen_factors, "Dn D11 wn") \
+    FN(yielding_planes, "Dn Dn Dn D11 wn")
 
 #endif

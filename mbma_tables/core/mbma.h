@@ -407,6 +407,43 @@ size_t mbma_spectrum_law_contact(const mbma_spectrum_law *law, size_t n, const d
 size_t mbma_spectrum_law_separation(const mbma_spectrum_law *law, size_t n, const double *force, int whole, double *u,
                                     double *slope);
 
+/* ---- yielding.c: contact whose pressure cannot exceed a hardness ----------------------------------------------------- */
+
+/* Constants fitted to boundary elements; docs/yield.md has the equations. Powers and scales of the contact area and of
+ * its yielded part; exponent of the force; stiffness of the frozen contact; flattening of yielded points. */
+typedef struct {
+    double area_power, area_scale, yield_power, yield_scale, force_light, force_eta, force_share, frozen, frozen_eta,
+        plane_eta, plane_load;
+} mbma_hardness_law;
+
+/* Levels of Gaussian heights at mean gaps below them, over h_rms. */
+size_t mbma_gaussian_levels(size_t n, const double *u, double *level);
+
+/* Shares of Gaussian heights above the levels of mean gaps, and their derivatives by the gap; heights end at `last`, which
+ * may be infinite. */
+size_t mbma_bearing_shares(size_t n, const double *u, const double *last, double *share, double *slope);
+
+/* Shares of a diffusion from x between walls at 0 and 1, after a variance of 2 tau: not absorbed at 0, or with a negative
+ * sign absorbed at 1. */
+size_t mbma_diffused(size_t n, const double *x, const double *tau, double sign, double *share);
+
+/* Forces over A0 E* g and their -d/du, with eta = p_m/(E* g), from the elastic ones at the same mean gap, the share of
+ * heights above its level and the derivative of that. */
+size_t mbma_yielding_forces(size_t n, const double *elastic, const double *stiffness, const double *share,
+                            const double *slope, const double *eta, const mbma_hardness_law *law, double *force,
+                            double *steep);
+
+/* A/A0, or its yielded part, at forces, from the elastic areas at these; above 1 only where those are. */
+size_t mbma_yielding_areas(size_t n, const double *force, const double *elastic_area, const double *eta,
+                           const mbma_hardness_law *law, int yielded, double *area);
+
+/* Stiffness of the contact frozen as it is, by which it unloads first, over the elastic -dF/du at the same mean gap. */
+size_t mbma_frozen_factors(size_t n, const double *eta, const mbma_hardness_law *law, double *factor);
+
+/* Gaps between mean planes at mean gaps and loads F/(p_m A0), over h_rms: less the flattening of yielded points. */
+size_t mbma_yielding_planes(size_t n, const double *u, const double *load, const double *eta,
+                            const mbma_hardness_law *law, double *gap);
+
 #ifdef __cplusplus
 }
 #endif

@@ -12,8 +12,10 @@ import numpy as np
 from mbma_tables import Bodies
 from mbma_tables import core as package
 from mbma_tables.islands.variants import REPORTED
+from mbma_tables.surfaces.bearing_curve import FRACTIONS
 from mbma_tables.tables.island4d import band_fields
 from mbma_tables.theories import Mbma
+from mbma_tables.theories.yielding.formulas import BearingCurve, diffused
 
 MOST_CALLS = 12  # of each function
 MOST_BYTES = 5_000_000  # of an array
@@ -154,6 +156,11 @@ def use():
                 theory=theory,
             )
             contact(one, Bodies(hardness=cap), pressure=found.pressure, theory=theory)
+    assert (found.plane_separation < found.mean_separation).any()
+    assert found.yielded.any()
+    assert (found.unloading_stiffness > found.stiffness).any()
+    diffused(np.linspace(0.0, 1.0, 30), np.geomspace(1e-3, 1.0, 30), -1.0)
+    BearingCurve(np.linspace(3.0, 0.0, FRACTIONS.size), 3.3)
     contact(many, mean_separation=1.0, theory="calibrated")
     # outside the calibrated table
     beyond = Surface(0.05, 1.0, 30.0, 1.0, 3.0)

@@ -59,6 +59,7 @@ CORE = (
     "totals.c",
     "calibrated.c",
     "spectrum_laws.c",
+    "yielding.c",
 )  # and the headers that they include
 ISLANDS = "island4d.c"  # beside `CORE`, for tables of four numbers
 # of the tables' arrays

@@ -5,7 +5,6 @@ variables: a page sets them from the current tables, so that writing one needs n
 """
 
 import base64
-import dataclasses
 import html
 import json
 import re
@@ -39,7 +38,7 @@ SHOWN_VARIANTS = (REPORTED, PRINTED, FITTED)
 SCRIPTS = (
     "model.js",
     "state.js",
-    "hardness.js",
+    "yielding.js",
     "curves.js",
     "downloads.js",
     "charts.js",
@@ -93,7 +92,7 @@ def _limits() -> dict[str, Any]:
         "compared": COMPARED,
         "area": ranges["area"],
         "max_samples": MAX_SAMPLES,
-        "hardness": dataclasses.asdict(hardness_law.CONSTANTS),
+        "hardness": hardness_law.CONSTANTS.numbers.tolist(),
     }
 
 

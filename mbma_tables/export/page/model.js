@@ -32,12 +32,13 @@ const tables = await Promise.all(
 );
 const C = (await WebAssembly.instantiate(bytesOf(DATA.model.module))).instance.exports;
 C._initialize();
-// memory that the module does not use: two laws, arguments, answers, a spectrum
-const OWN = 65536 * C.memory.grow(Math.ceil((2 * LAW_BYTES + 2048 + 16 * LIMITS.max_samples) / 65536));
+// memory that the module does not use: two laws, arguments, answers, numbers of yielding, a spectrum
+const OWN = 65536 * C.memory.grow(Math.ceil((2 * LAW_BYTES + 3072 + 16 * LIMITS.max_samples) / 65536));
 const LAWS = { persson: OWN, calibrated: OWN + LAW_BYTES };
 const ARGUMENTS = OWN + 2 * LAW_BYTES,
   ANSWER = ARGUMENTS + 1024,
-  SAMPLES = ANSWER + 1024;
+  YIELDING = ANSWER + 1024,
+  SAMPLES = YIELDING + 1024;
 const numbersAt = (place, count) => new Float64Array(C.memory.buffer, place, count);
 for (const [name, bytes] of tables) new Uint8Array(C.memory.buffer, C[name].value, bytes.length).set(bytes);
 

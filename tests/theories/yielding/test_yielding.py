@@ -460,6 +460,26 @@ def test_levels_of_mean_gaps():
             assert level == pytest.approx(float(d), abs=1e-14, rel=1e-15)
 
 
+def test_flattening_is_that_of_gaussian_heights_above_a_level():
+    share = np.concatenate([np.geomspace(1e-250, 0.4, 30), [0.5, 0.6, 0.99, 1 - 1e-9]])
+    gap = hardness.plane_separation(0.0, share, 0.0)
+    with mpmath.workdps(300):
+        for x, found in zip(share.tolist(), gap.tolist(), strict=True):
+            d = mpmath.sqrt(2) * mpmath.erfinv(1 - 2 * mpmath.mpf(x))
+            above = mpmath.npdf(d) - d * x
+            assert -found == pytest.approx(float(above), rel=1e-12, abs=1e-250)
+
+
+def test_without_yielding_the_area_is_the_elastic_one():
+    """By the inverse of erf and back, whatever the area."""
+    elastic = np.concatenate(
+        [np.geomspace(1e-300, 0.5, 40), 1 - np.geomspace(1e-16, 0.5, 40)]
+    )
+    for yielded, expected in ((False, elastic), (True, 0.0 * elastic)):
+        found = hardness.area(0.3 * elastic, elastic, 1e6, yielded=yielded)
+        np.testing.assert_allclose(found, expected, rtol=1e-14, atol=1e-300)
+
+
 def test_bearing_curve_of_a_map_is_that_of_its_heights():
     surface = heights(Recipe("worn", 0.8, 8, 4, 3, 128, 0.5))
     known = bearing(surface, (1.0, 1.0))
