@@ -52,8 +52,7 @@ FUNCTIONS = (
     "mbma_surface_spectrum_of",
     "mbma_spectrum_contact_of",
     "mbma_spectrum_separation_of",
-    "mbma_bearing_shares",
-    "mbma_yielding_forces",
+    "mbma_yielding_at_gaps",
     "mbma_yielding_areas",
     "mbma_frozen_factors",
 )

@@ -934,6 +934,14 @@ static bool do_yielding_forces(const argument *a, long long *answer) {
     return true;
 }
 
+static bool do_yielding_at_gaps(const argument *a, long long *answer) {
+    enum { ELASTIC, STIFFNESS, GAP, LAST, ETA, LAW, FORCE, STEEP };
+    *answer = (long long)mbma_yielding_at_gaps(
+        a[ELASTIC].count, a[ELASTIC].items, a[STIFFNESS].items, a[GAP].items, a[LAST].items,
+        a[ETA].items, a[LAW].items, a[FORCE].items, a[STEEP].items);
+    return true;
+}
+
 static bool do_yielding_areas(const argument *a, long long *answer) {
     enum { FORCE, ELASTIC, ETA, LAW, YIELDED, AREA };
     *answer = (long long)mbma_yielding_areas(a[FORCE].count, a[FORCE].items, a[ELASTIC].items,
@@ -1011,6 +1019,7 @@ static bool do_yielding_planes(const argument *a, long long *answer) {
     FN(bearing_shares, "Dn Dn wn wn") \
     FN(diffused, "Dn Dn d wn") \
     FN(yielding_forces, "Dn Dn Dn Dn Dn D11 wn wn") \
+    FN(yielding_at_gaps, "Dn Dn Dn Dn Dn D11 wn wn") \
     FN(yielding_areas, "Dn Dn Dn D11 i wn") \
     FN(frozen_factors, "Dn D11 wn") \
     FN(yielding_planes, "Dn Dn Dn D11 wn")

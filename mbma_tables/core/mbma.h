@@ -433,6 +433,11 @@ size_t mbma_yielding_forces(size_t n, const double *elastic, const double *stiff
                             const double *slope, const double *eta, const mbma_hardness_law *law, double *force,
                             double *steep);
 
+/* The same of Gaussian heights that end at `last`, at mean gaps u. */
+size_t mbma_yielding_at_gaps(size_t n, const double *elastic, const double *stiffness, const double *u,
+                             const double *last, const double *eta, const mbma_hardness_law *law, double *force,
+                             double *steep);
+
 /* A/A0, or its yielded part, at forces, from the elastic areas at these; above 1 only where those are. */
 size_t mbma_yielding_areas(size_t n, const double *force, const double *elastic_area, const double *eta,
                            const mbma_hardness_law *law, int yielded, double *area);

@@ -112,22 +112,44 @@ size_t mbma_gaussian_levels(size_t n, const double *u, double *level) {
     return bad;
 }
 
+/* A share of the nominal area and its derivative by the mean gap. */
+typedef struct {
+    double share, slope;
+} bearing;
+
+/* The highest point of Gaussian heights, and its level. */
+typedef struct {
+    double last, level;
+} highest;
+
+/* Most calls have one highest point, whose level is found once. */
+static highest highest_at(double last, highest known) {
+    if (last == known.last)
+        return known;
+    const highest found = {last, last < INFINITY ? gaussian_level(last) : last};
+    return found;
+}
+
+/* The share of Gaussian heights above the level of a mean gap. */
+static bearing gaussian_bearing(double u, highest end) {
+    const double d = gaussian_level(u), below = share_below(d), all = share_below(end.level);
+    const double above = end.level > 0.0 ? share_below(-d) - share_below(-end.level) : all - below;
+    const double steep = u <= LEAST_GAP ? -INFINITY : -density(d) / below;
+    const bearing none = {NAN, NAN}, found = {mbma_max(above, 0.0) / all, u >= end.last ? 0.0 : steep / all};
+    return d == d && end.level == end.level ? found : none;
+}
+
+static const highest UNKNOWN = {NAN, NAN};
+
 size_t mbma_bearing_shares(size_t n, const double *u, const double *last, double *share, double *slope) {
-    double known = NAN, end = NAN;
+    highest end = UNKNOWN;
     size_t bad = 0;
     for (size_t k = 0; k < n; k++) {
-        /* most calls have one highest point */
-        if (last[k] != known) {
-            known = last[k];
-            end = known < INFINITY ? gaussian_level(known) : known;
-        }
-        const double d = gaussian_level(u[k]), below = share_below(d), all = share_below(end);
-        const double above = end > 0.0 ? share_below(-d) - share_below(-end) : all - below;
-        const double steep = u[k] <= LEAST_GAP ? -INFINITY : -density(d) / below;
-        const bool good = d == d && end == end && last[k] == last[k];
-        share[k] = good ? mbma_max(above, 0.0) / all : NAN;
-        slope[k] = !good ? NAN : u[k] >= last[k] ? 0.0 : steep / all;
-        bad += !good;
+        end = highest_at(last[k], end);
+        const bearing found = gaussian_bearing(u[k], end);
+        share[k] = found.share;
+        slope[k] = found.slope;
+        bad += found.share != found.share;
     }
     return bad;
 }
@@ -218,12 +240,7 @@ size_t mbma_yielding_areas(size_t n, const double *force, const double *elastic_
     return bad;
 }
 
-/* A share of the nominal area and its derivative by the mean gap. */
-typedef struct {
-    double share, slope;
-} bearing;
-
-/* That of heights above the level, or what the elastic contact covers without yielding, of which the
+/* The share of heights above the level, or what the elastic contact covers without yielding, of which the
  * odds of the larger count, without a kink where they are equal. */
 static bearing joined(bearing heights, double elastic, double stiffness, double eta) {
     const double unyielded = -expm1(-2.0 * eta * eta);
@@ -279,6 +296,19 @@ size_t mbma_yielding_forces(size_t n, const double *elastic, const double *stiff
     for (size_t k = 0; k < n; k++) {
         const bearing heights = {share[k], slope[k]};
         force_at(elastic[k], stiffness[k], heights, eta[k], law, &force[k], &steep[k]);
+        bad += force[k] != force[k] || steep[k] != steep[k];
+    }
+    return bad;
+}
+
+size_t mbma_yielding_at_gaps(size_t n, const double *elastic, const double *stiffness, const double *u,
+                             const double *last, const double *eta, const mbma_hardness_law *law, double *force,
+                             double *steep) {
+    highest end = UNKNOWN;
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        end = highest_at(last[k], end);
+        force_at(elastic[k], stiffness[k], gaussian_bearing(u[k], end), eta[k], law, &force[k], &steep[k]);
         bad += force[k] != force[k] || steep[k] != steep[k];
     }
     return bad;

@@ -15,7 +15,12 @@ from mbma_tables.islands.variants import REPORTED
 from mbma_tables.surfaces.bearing_curve import FRACTIONS
 from mbma_tables.tables.island4d import band_fields
 from mbma_tables.theories import Mbma
-from mbma_tables.theories.yielding.formulas import BearingCurve, diffused
+from mbma_tables.theories.yielding.formulas import (
+    BearingCurve,
+    bearing_share,
+    diffused,
+    force,
+)
 
 MOST_CALLS = 12  # of each function
 MOST_BYTES = 5_000_000  # of an array
@@ -159,6 +164,8 @@ def use():
     assert (found.plane_separation < found.mean_separation).any()
     assert found.yielded.any()
     assert (found.unloading_stiffness > found.stiffness).any()
+    bearing_share(np.linspace(0.0, 3.5, 30), 3.0)
+    force(0.1, 0.5, 0.2, -0.4, 0.3)
     diffused(np.linspace(0.0, 1.0, 30), np.geomspace(1e-3, 1.0, 30), -1.0)
     BearingCurve(np.linspace(3.0, 0.0, FRACTIONS.size), 3.3)
     contact(many, mean_separation=1.0, theory="calibrated")

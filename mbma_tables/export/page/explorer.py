@@ -5,6 +5,7 @@ variables: a page sets them from the current tables, so that writing one needs n
 """
 
 import base64
+import dataclasses
 import html
 import json
 import re
@@ -92,7 +93,7 @@ def _limits() -> dict[str, Any]:
         "compared": COMPARED,
         "area": ranges["area"],
         "max_samples": MAX_SAMPLES,
-        "hardness": hardness_law.CONSTANTS.numbers.tolist(),
+        "hardness": dataclasses.astuple(hardness_law.CONSTANTS),
     }
 
 

@@ -3,7 +3,7 @@
 // the law's constants, then the arguments and results of the calls
 const HARDNESS_LAW = YIELDING;
 numbersAt(HARDNESS_LAW, LIMITS.hardness.length).set(LIMITS.hardness);
-const ENTRIES = ["u", "last", "share", "slope", "force", "stiffness", "eta", "capped", "steep", "area", "covered", "frozen"];
+const ENTRIES = ["u", "last", "force", "stiffness", "eta", "capped", "steep", "area", "covered", "frozen"];
 const PLACES = Object.fromEntries(
   ENTRIES.map((name, k) => [name, HARDNESS_LAW + 8 * (LIMITS.hardness.length + k)]),
 );
@@ -13,15 +13,14 @@ const get = (name) => numbersAt(PLACES[name], 1)[0];
 // Answers at mean separations: force, area, stiffness of loading, and of a small unloading.
 function yielding(model, theory, state, h_rms, gradient) {
   const scale = state.E_star * gradient,
-    { u, last, share, slope, force, stiffness, eta, capped, steep, area, covered, frozen } = PLACES,
+    { u, last, force, stiffness, eta, capped, steep, area, covered, frozen } = PLACES,
     elasticAt = separations(model, theory, state.h_max);
   put({ last: state.h_max / h_rms, eta: state.hardness / scale });
   return (gap) => {
     const elastic = model[theory](gap);
     if (!elastic || !(elastic.force > 0)) return elastic;
     put({ u: gap / h_rms, force: elastic.force / scale, stiffness: (elastic.stiffness * h_rms) / scale });
-    C.mbma_bearing_shares(1, u, last, share, slope);
-    C.mbma_yielding_forces(1, force, stiffness, share, slope, eta, HARDNESS_LAW, capped, steep);
+    C.mbma_yielding_at_gaps(1, force, stiffness, u, last, eta, HARDNESS_LAW, capped, steep);
     C.mbma_frozen_factors(1, eta, HARDNESS_LAW, frozen);
     const same = model[theory](elasticAt(scale * get("capped")));
     put({ area: same ? same.area : NaN });

@@ -8,6 +8,7 @@ formulas are the core's, `yielding.c`.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from typing import Any
 
 import numpy as np
@@ -42,13 +43,14 @@ class Constants:
     plane_eta: float = 3.375
     plane_load: float = 2.505
 
-    @property
-    def numbers(self) -> FloatArray:
-        """`mbma_hardness_law` of mbma.h."""
-        return np.array(dataclasses.astuple(self))
-
 
 CONSTANTS = Constants()
+
+
+@functools.cache
+def _numbers(constants: Constants) -> FloatArray:
+    """The constants as the core takes them, `mbma_hardness_law` of mbma.h."""
+    return np.array(dataclasses.astuple(constants))
 
 
 def area(
@@ -60,7 +62,7 @@ def area(
 ) -> FloatArray:
     """A/A0, or its yielded part, at F/(A0 E* g), at most eta, from the elastic A/A0 there; above 1 only if that is."""
     given = (force, elastic_area, eta)
-    return answered(core.yielding_areas, given, 1, constants.numbers, int(yielded))[0]
+    return answered(core.yielding_areas, given, 1, _numbers(constants), int(yielded))[0]
 
 
 def diffused(x: ArrayLike, tau: ArrayLike, sign: float) -> FloatArray:
@@ -90,7 +92,7 @@ def force(
     is the elastic one, and a soft one follows the heights alone.
     """
     given = (elastic_force, stiffness, share, slope, eta)
-    load, steep = answered(core.yielding_forces, given, 2, constants.numbers)
+    load, steep = answered(core.yielding_forces, given, 2, _numbers(constants))
     return load, steep
 
 
@@ -105,25 +107,26 @@ def closed(
 ) -> tuple[FloatArray, FloatArray]:
     """`force` over A0 E* at mean gaps [length] of a `BearingCurve`, or of Gaussian heights by their end."""
     x = u / h_rms
-    share, slope = (
-        heights(x) if isinstance(heights, BearingCurve) else bearing_share(x, heights)
-    )
-    load, steep = force(
-        pressure / gradient, stiffness / gradient, share, slope / h_rms, eta
-    )
-    return load * gradient, steep * gradient
+    elastic = pressure / gradient, stiffness * (h_rms / gradient)
+    if isinstance(heights, BearingCurve):
+        load, steep = force(*elastic, *heights(x), eta)
+    else:
+        last = np.inf if heights is None else heights
+        given = (*elastic, x, last, eta)
+        load, steep = answered(core.yielding_at_gaps, given, 2, _numbers(CONSTANTS))
+    return load * gradient, steep * (gradient / h_rms)
 
 
 def frozen_factor(eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
     """Stiffness of the frozen contact over the elastic -dF/du at the same mean gap."""
-    return answered(core.frozen_factors, (eta,), 1, constants.numbers)[0]
+    return answered(core.frozen_factors, (eta,), 1, _numbers(constants))[0]
 
 
 def plane_separation(
     u: ArrayLike, load: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS
 ) -> FloatArray:
     """Gap between mean planes [h_rms] at mean gap u and x = F/(p_m A0): less the flattening of yielded points."""
-    return answered(core.yielding_planes, (u, load, eta), 1, constants.numbers)[0]
+    return answered(core.yielding_planes, (u, load, eta), 1, _numbers(constants))[0]
 
 
 def bearing_share(
