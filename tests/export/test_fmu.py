@@ -283,6 +283,86 @@ def test_a_step_outside_the_range_is_discarded_and_can_be_repeated(tmp_path):
     model.freeInstance()
 
 
+@needs("cc")
+def test_an_fmu_of_fmi_3_is_the_same_law(tmp_path):
+    fmpy = pytest.importorskip("fmpy")
+    validation = pytest.importorskip("fmpy.validation")
+    path = tmp_path / "road.fmu"
+    path.write_bytes(made("calibrated", binaries="here", fmi=3, **MORE))
+    assert validation.validate_fmu(str(path)) == []
+    law = points("calibrated").law
+    for kind in KINDS:
+        asked = {"start_values": {"overclosure": 0.75}, "output": QUANTITIES}
+        found = fmpy.simulate_fmu(str(path), stop_time=1.0, fmi_type=kind, **asked)[-1]
+        known = law.values(3 - 0.75)
+        expected = [known.pressure, known.stiffness, known.area, known.energy]
+        np.testing.assert_allclose(list(found)[1:5], expected, rtol=1e-12)
+        conductance = CONDUCTIVITY / 13.3 * known.stiffness
+        sheared, leaked = known.stiffness / KAPPA, float(law.leakage(3 - 0.75))
+        more = [conductance, sheared, leaked]
+        np.testing.assert_allclose(list(found)[5:], more, rtol=1e-11)
+
+
+@needs("cc")
+def test_a_step_of_fmi_3_outside_the_range_is_discarded(tmp_path):
+    fmpy = pytest.importorskip("fmpy")
+    from fmpy.fmi3 import FMU3Slave
+
+    (tmp_path / "road.fmu").write_bytes(made("calibrated", binaries="here", fmi=3))
+    folder = fmpy.extract(str(tmp_path / "road.fmu"), unzipdir=tmp_path / "road")
+    description = fmpy.read_model_description(folder)
+    model = FMU3Slave(
+        guid=description.guid,
+        unzipDirectory=folder,
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="road",
+    )
+    said = []
+    model.instantiate(logMessage=lambda *words: said.append(words[1:]))
+    model.enterInitializationMode(startTime=0.0)
+    model.exitInitializationMode()
+    model.setFloat64([1], [0.5])
+    assert model.doStep(0.0, 1.0) == (False, False, False, 1.0)
+    law = points("calibrated").law
+    slope = model.getDirectionalDerivative([2], [1], [2.0])
+    assert slope[0] == pytest.approx(2 * float(law.stiffness(separation=2.0)), rel=1e-11)
+    model.setFloat64([1], [1e9])
+    for ask in (lambda: model.doStep(1.0, 1.0), lambda: model.getFloat64([2])):
+        with pytest.raises(Exception, match="failed with status 2"):
+            ask()
+        status, category, text = said[-1]
+        assert (status, category) == (2, b"logStatusDiscard")
+        assert b"overclosure = 1000000000 must be from" in text
+    # the same model goes on
+    model.setFloat64([1], [0.75])
+    model.doStep(1.0, 0.5)
+    found = model.getFloat64([2])[0]
+    assert found == pytest.approx(float(law.pressure(3 - 0.75)), rel=1e-12)
+    model.terminate()
+    model.freeInstance()
+
+
+@pytest.mark.slow
+@needs("cmake", "gcc")
+def test_the_headers_of_fmi_3_agree(tmp_path):
+    """All functions of the standard are there, with its arguments, without a warning."""
+    pytest.importorskip("fmpy")
+    build = pytest.importorskip("fmpy.build")
+    (tmp_path / "build").mkdir()
+    content = made("mbma", fmi=3, **MORE)
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        archive.extractall(tmp_path / "road")
+    build.build_platform_binary(
+        tmp_path / "road",
+        tmp_path / "build",
+        all_warnings=True,
+        cmake_options={"CMAKE_C_FLAGS:STRING": "-Werror"},
+    )
+    found = simulated(str(tmp_path / "road"), "CoSimulation", np.array([0.5, 1.0, 1.0]))
+    known = np.asarray(points("mbma").law.pressure(3 - np.array([0.5, 1.0])))
+    np.testing.assert_allclose(found["pressure"][1:], known, rtol=1e-12)
+
+
 @pytest.mark.parametrize("fails", [False, True])
 def test_an_fmu_without_a_compiler(fails, tmp_path, monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
@@ -313,6 +393,39 @@ def test_an_fmu_for_all_platforms():
     said = archive.read("modelDescription.xml").decode()
     assert "win64 (x86-64); on ARM the importing tool compiles the sources" in said
     assert_oldest_glibc(archive, said)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    importlib.util.find_spec("ziglang") is None, reason="not installed: ziglang"
+)
+def test_an_fmu_of_fmi_3_has_binaries_for_arm():
+    archive = zipfile.ZipFile(io.BytesIO(made("mbma", binaries="all", fmi=3)))
+    machines = {}
+    for name in archive.namelist():
+        if name.startswith("binaries/"):
+            content = archive.read(name)
+            folder = name.split("/")[1]
+            if content[:4] == b"\x7fELF":
+                machines[folder] = int.from_bytes(content[18:20], "little")
+            elif content[:2] == b"MZ":
+                at = int.from_bytes(content[0x3C:0x40], "little")
+                machines[folder] = int.from_bytes(content[at + 4 : at + 6], "little")
+            else:
+                machines[folder] = int.from_bytes(content[4:8], "little")
+    # numbers of machines of ELF, Mach-O and PE
+    assert machines == {
+        "x86_64-linux": 62,
+        "aarch64-linux": 183,
+        "x86_64-darwin": 0x01000007,
+        "aarch64-darwin": 0x0100000C,
+        "x86_64-windows": 0x8664,
+        "aarch64-windows": 0xAA64,
+    }
+    said = archive.read("modelDescription.xml").decode()
+    for machine in ("x86_64", "aarch64"):
+        stated = re.search(rf"{machine}-linux \(glibc (\d+)\.(\d+) and later\)", said)
+        assert tuple(map(int, stated.groups())) <= (2, 17)
 
 
 test_requests_that_are_refused = refusals(

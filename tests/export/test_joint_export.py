@@ -58,7 +58,7 @@ def test_every_target_takes_a_joint_with_a_name(joint, target, tmp_path):
         pytest.importorskip("pyarrow")
     kind = targets()[target]
     path = tmp_path / f"bolt{kind.end or '.txt'}"
-    options = {"binaries": "none"} if target == "fmu" else {}
+    options = {"binaries": "none"} if target in ("fmu", "fmu3") else {}
     written = joint.export(
         target, SPAN if kind.rows else None, name="bolt", path=path, **options
     )
@@ -68,7 +68,14 @@ def test_every_target_takes_a_joint_with_a_name(joint, target, tmp_path):
     beside = {"c-law": {"bolt.h"}, "fortran-law": {"bolt_c.c"}, "matlab": {"bolt.m"}}
     beside["javascript-law"] = {"bolt.cjs", "bolt.d.mts", "bolt.d.cts"}
     assert {each.name for each in written[:-1]} == beside.get(target, set())
-    if target not in ("fmu", "hdf5", "netcdf", "parquet", "matlab"):  # which are not text
+    if target not in (
+        "fmu",
+        "fmu3",
+        "hdf5",
+        "netcdf",
+        "parquet",
+        "matlab",
+    ):  # which are not text
         assert "bolt" in path.read_text()
 
 

@@ -30,7 +30,7 @@ def run(*words):
 
 
 def options_of(target):
-    if target == "fmu":
+    if target in ("fmu", "fmu3"):
         return ["--binaries", "none"]
     return SPAN if targets()[target].rows else []
 

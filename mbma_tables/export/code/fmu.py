@@ -1,6 +1,7 @@
-"""A contact law as a Functional Mock-up Unit, FMI 2.0, model exchange and co-simulation: C and binaries."""
+"""A contact law as a Functional Mock-up Unit, FMI 2.0 or 3.0, model exchange and co-simulation: C and binaries."""
 
 import contextlib
+import functools
 import importlib.util
 import io
 import platform
@@ -9,6 +10,7 @@ import shutil
 import sys
 import uuid
 import zipfile
+from collections.abc import Mapping
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -26,11 +28,31 @@ from mbma_tables.export.text import checked_name, filled, inert, number
 from mbma_tables.surfaces.any_surface import AnySurface
 
 GLIBC = "2.17"  # of Linux distributions from 2014 on
-# by zig's names of platforms: folders in FMI 2.0, which has none of ARM, and ends of libraries
+# by zig's names of platforms: folders and ends of libraries, in FMI 2.0, which has none of
+# ARM, and in FMI 3.0
 PLATFORMS = {
-    f"x86_64-linux-gnu.{GLIBC}": ("linux64", ".so"),
-    "x86_64-macos.10.13": ("darwin64", ".dylib"),
-    "x86_64-windows-gnu": ("win64", ".dll"),
+    2: {
+        f"x86_64-linux-gnu.{GLIBC}": ("linux64", ".so"),
+        "x86_64-macos.10.13": ("darwin64", ".dylib"),
+        "x86_64-windows-gnu": ("win64", ".dll"),
+    },
+    3: {
+        f"x86_64-linux-gnu.{GLIBC}": ("x86_64-linux", ".so"),
+        f"aarch64-linux-gnu.{GLIBC}": ("aarch64-linux", ".so"),
+        "x86_64-macos.10.13": ("x86_64-darwin", ".dylib"),
+        "aarch64-macos.11.0": ("aarch64-darwin", ".dylib"),
+        "x86_64-windows-gnu": ("x86_64-windows", ".dll"),
+        "aarch64-windows-gnu": ("aarch64-windows", ".dll"),
+    },
+}
+# by names of the machine and its system
+MACHINES = {
+    "x86_64 linux": "x86_64-linux-",
+    "aarch64 linux": "aarch64-linux-",
+    "x86_64 darwin": "x86_64-macos",
+    "arm64 darwin": "aarch64-macos",
+    "amd64 win32": "x86_64-windows",
+    "arm64 win32": "aarch64-windows",
 }
 INPUT = 1  # value reference of overclosure, after time
 
@@ -41,9 +63,10 @@ def fmu(
     *,
     name: str = "law",
     binaries: str = "here",
+    fmi: int = 2,
     **asked: Any,
 ) -> bytes:
-    """A contact law as an FMU of FMI 2.0: overclosure in; pressure, tangent, area and energy out.
+    """A contact law as an FMU of FMI 2.0 or 3.0: overclosure in; pressure, tangent, area and energy out.
 
     Parameters
     ----------
@@ -52,8 +75,10 @@ def fmu(
     binaries : {"here", "all", "none"}
         Beside the sources: a binary for this platform, by the system's C compiler or zig,
         where one of them is installed; binaries for Linux, macOS and Windows on x86-64, by
-        zig (the extra "fmu"); or none. FMI 2.0 names no folder for ARM, where the importing
-        tool compiles the sources.
+        zig (the extra "fmu"); or none. FMI 3.0 has those for ARM as well; FMI 2.0 names no
+        folder for ARM, where the importing tool compiles the sources.
+    fmi : int
+        2 or 3, the version of the standard.
 
     Returns
     -------
@@ -91,22 +116,22 @@ def fmu(
         "LEAST": number(exported.c_least, infinity="INFINITY"),
         "MOST": number(exported.c_most),
     }
-    source = filled(
-        "code/fmu.c",
-        **parts,
-    )
-    built = _binaries(name, source, binaries)
+    source = filled("code/fmu.c" if fmi == 2 else "code/fmu3.c", **parts)
+    built = _binaries(name, source, binaries, PLATFORMS[fmi])
     listed = (
         ", ".join(map(_platform, built, built.values()))
         or "none, sources only: the importing tool compiles them"
     )
-    if binaries == "all":
+    if binaries == "all" and fmi == 2:
         listed += " (x86-64); on ARM the importing tool compiles the sources"
     said = "\n".join(map(inert, (*found.said, f"binaries: {listed}")))
+    describe = _description if fmi == 2 else _description_of_fmi3
     files = {
-        "modelDescription.xml": _description(name, token, said, variables, exported),
+        "modelDescription.xml": describe(name, token, said, variables, exported),
         f"sources/{name}.c": source.encode(),
     }
+    if fmi == 3:
+        files["sources/buildDescription.xml"] = _build_description(name)
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:
         for path, content in (files | built).items():
@@ -127,7 +152,9 @@ def _platform(path: str, binary: bytes) -> str:
     return f"{folder} (glibc {major_needed}.{minor_needed} and later)"
 
 
-def _binaries(name: str, source: str, asked: str) -> dict[str, bytes]:
+def _binaries(
+    name: str, source: str, asked: str, platforms: Mapping[str, tuple[str, str]]
+) -> dict[str, bytes]:
     """Shared libraries by their paths in the file, for the platforms asked for, as far as there is a compiler."""
     if asked not in ("here", "all", "none"):
         raise InputError(
@@ -139,17 +166,14 @@ def _binaries(name: str, source: str, asked: str) -> dict[str, bytes]:
         raise InputError(
             "binaries for all platforms are compiled by ziglang: pip install ziglang"
         )
-    here = {
-        "x86_64 linux": "linux64",
-        "x86_64 darwin": "darwin64",
-        "amd64 win32": "win64",
-    }.get(system)
+    here = MACHINES.get(system)
     found = {}
-    for target, (folder, end) in PLATFORMS.items():
+    for target, (folder, end) in platforms.items():
+        is_here = here is not None and target.startswith(here)
         # a file for all platforms is for others' machines, whose C library may be older
         # than that of this one
-        own_cc = asked == "here" and folder == here and shutil.which("cc")
-        if not (own_cc or zig) or asked == "none" or (asked == "here" and folder != here):
+        own_cc = asked == "here" and is_here and shutil.which("cc")
+        if not (own_cc or zig) or asked == "none" or (asked == "here" and not is_here):
             continue
         command = (
             ["cc"]
@@ -214,9 +238,7 @@ def _description(
     variables: list[dict[str, str]],
     exported: ExportedLaw,
 ) -> bytes:
-    """modelDescription.xml."""
-    length = exported.length
-    stress = exported.stress
+    """modelDescription.xml of FMI 2.0."""
     facts = {"fmiVersion": "2.0", "modelName": name, "guid": token, "description": text}
     facts |= {
         "generationTool": f"mbma_tables {__version__}",
@@ -232,7 +254,33 @@ def _description(
         ET.SubElement(
             ET.SubElement(interface, "SourceFiles"), "File", {"name": f"{name}.c"}
         )
-    # by units of SI
+    _add_units(root, variables, exported)
+    categories = ET.SubElement(root, "LogCategories")
+    for category in ("logStatusDiscard", "logStatusError"):
+        ET.SubElement(categories, "Category", {"name": category})
+    listed = ET.SubElement(root, "ModelVariables")
+    structure = ET.SubElement(root, "ModelStructure")
+    of_real = ("unit", "start", "min", "max")
+    for reference, all_of in enumerate(variables):
+        outer = {"valueReference": str(reference), "variability": "continuous"}
+        outer |= {key: value for key, value in all_of.items() if key not in of_real}
+        inner = {key: all_of[key] for key in of_real if key in all_of}
+        ET.SubElement(ET.SubElement(listed, "ScalarVariable", outer), "Real", inner)
+    for kind in ("Outputs", "InitialUnknowns"):
+        parent = ET.SubElement(structure, kind)
+        for place in range(INPUT + 2, len(variables) + 1):  # in the list, from 1
+            ET.SubElement(
+                parent, "Unknown", {"index": str(place), "dependencies": str(INPUT + 1)}
+            )
+    return _written(root)
+
+
+def _add_units(
+    root: ET.Element, variables: list[dict[str, str]], exported: ExportedLaw
+) -> None:
+    """The units of the variables by units of SI."""
+    length = exported.length
+    stress = exported.stress
     metre = factor(length, "m")
     pascal = factor(stress, "Pa", "stress")
     bases: dict[str, tuple[dict[str, int], float]] = {
@@ -253,25 +301,58 @@ def _description(
                 "factor": number(size)
             }
             ET.SubElement(named, "BaseUnit", base)
+
+
+def _written(root: ET.Element) -> bytes:
+    ET.indent(root)
+    return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))
+
+
+def _description_of_fmi3(
+    name: str,
+    token: str,
+    text: str,
+    variables: list[dict[str, str]],
+    exported: ExportedLaw,
+) -> bytes:
+    """modelDescription.xml of FMI 3.0."""
+    facts = {"fmiVersion": "3.0", "modelName": name, "instantiationToken": token}
+    facts |= {
+        "description": text,
+        "generationTool": f"mbma_tables {__version__}",
+        "variableNamingConvention": "flat",
+    }
+    root = ET.Element("fmiModelDescription", facts)
+    provides = {"modelIdentifier": name, "providesDirectionalDerivatives": "true"}
+    ET.SubElement(root, "ModelExchange", provides)
+    steps = {"canHandleVariableCommunicationStepSize": "true"}
+    ET.SubElement(root, "CoSimulation", provides | steps)
+    _add_units(root, variables, exported)
     categories = ET.SubElement(root, "LogCategories")
     for category in ("logStatusDiscard", "logStatusError"):
         ET.SubElement(categories, "Category", {"name": category})
     listed = ET.SubElement(root, "ModelVariables")
     structure = ET.SubElement(root, "ModelStructure")
-    of_real = ("unit", "start", "min", "max")
     for reference, all_of in enumerate(variables):
-        outer = {"valueReference": str(reference), "variability": "continuous"}
-        outer |= {key: value for key, value in all_of.items() if key not in of_real}
-        inner = {key: all_of[key] for key in of_real if key in all_of}
-        ET.SubElement(ET.SubElement(listed, "ScalarVariable", outer), "Real", inner)
-    for kind in ("Outputs", "InitialUnknowns"):
-        parent = ET.SubElement(structure, kind)
-        for place in range(INPUT + 2, len(variables) + 1):  # in the list, from 1
-            ET.SubElement(
-                parent, "Unknown", {"index": str(place), "dependencies": str(INPUT + 1)}
-            )
-    ET.indent(root)
-    return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True))
+        own = {"valueReference": str(reference), "variability": "continuous"}
+        ET.SubElement(listed, "Float64", own | all_of)
+    for kind in ("Output", "InitialUnknown"):
+        for reference in range(INPUT + 1, len(variables)):
+            depends = {"valueReference": str(reference), "dependencies": str(INPUT)}
+            ET.SubElement(structure, kind, depends)
+    return _written(root)
 
 
-TARGETS = (Target("fmu", fmu, CODE | {"binaries"}, rows=False),)
+def _build_description(name: str) -> bytes:
+    """buildDescription.xml, by which tools compile the sources of FMI 3.0."""
+    root = ET.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
+    built = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": name})
+    files = ET.SubElement(built, "SourceFileSet", {"language": "C99"})
+    ET.SubElement(files, "SourceFile", {"name": f"{name}.c"})
+    return _written(root)
+
+
+TARGETS = (
+    Target("fmu", fmu, CODE | {"binaries"}, rows=False),
+    Target("fmu3", functools.partial(fmu, fmi=3), CODE | {"binaries"}, rows=False),
+)
