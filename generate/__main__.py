@@ -23,6 +23,7 @@ COMMANDS = {
     ),
     **dict.fromkeys(("film", "tangential"), "generate.machined.studies"),
     "artefacts": "generate.machined.artefacts",
+    "drawing": "generate.drawing",
     "edges": "generate.machined.edges",
     "formulas": "generate.formulas",
     "gaps": "generate.gaps",

@@ -159,14 +159,22 @@ def cost(recipe: Recipe) -> float:
 def campaign(kind: str = "elastic") -> list[Task]:
     """Every surface to solve, cheap ones first and kinds in turn, so that stopping early leaves a balanced set.
 
-    `kind` is elastic, hardness (pressures are capped) or leakage (gaps are solved for flow).
+    `kind` is elastic, hardness (pressures are capped), leakage (gaps are solved for flow) or
+    bandwidth, whose surfaces are all large and come as they are listed.
     """
+    recipes = [Recipe(*row) for row in CAMPAIGNS["refined"][kind]]
+    fixed = [recipe for recipe in recipes if recipe.points]
     refined = [
         Task(dataclasses.replace(recipe, points=points), REFINEMENT)
         for points, recipe in itertools.product(
-            FINER, (Recipe(*row) for row in CAMPAIGNS["refined"][kind])
+            FINER, (recipe for recipe in recipes if not recipe.points)
         )
         if points > 2 * recipe.band[1]
+    ]
+    refined += [
+        Task(dataclasses.replace(recipe, points=points), REFINEMENT)
+        for recipe in fixed
+        for points in (recipe.points // 2, recipe.points)
     ]
     tasks = []
     for family, hursts, bands, points, surfaces, shapes, held_out in CAMPAIGNS[kind]:
@@ -196,6 +204,10 @@ def campaign(kind: str = "elastic") -> list[Task]:
                         Task(dataclasses.replace(node, seed=seed), split),
                     )
                 )
+    if kind == "bandwidth":
+        # stable: in the order listed
+        tasks.sort(key=lambda entry: entry[1])
+        return [*(entry[3] for entry in tasks), *refined]
     tasks.sort(key=lambda entry: entry[:3])
     return sorted(
         refined + [entry[3] for entry in tasks], key=lambda task: cost(task.recipe)

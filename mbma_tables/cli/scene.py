@@ -284,7 +284,8 @@ def _report_of_ranges(
         units |= dict.fromkeys((name, *ends), column_unit(found.units[name]))
     values["valid"] = np.where(found.valid, "yes", "no")
     facts = joint.facts()
-    assumed = assumptions(joint.surface)
+    assumed = [f"{name} {text}" for name, text in joint.assumed.items()]
+    assumed += assumptions(joint.surface)
     notes = [f"{name}: {text}" for name, text in facts.items() if name != "assumed"]
     notes += assumption_notes(assumed)
     notes.append(

@@ -18,8 +18,9 @@ from mbma_tables.common.units import DIMENSIONS, Units, read
 # in 100,000, of which some would be negative heights
 TAILS = 4.0
 MEASURED = "measured"  # key of measured values
+LOG = "log"  # after a range, of which every logarithm is equally probable
 FORMS = (
-    "'0.25..2.5 mm' is a range, '1.6 um +- 0.2 um' a mean and its standard deviation, "
+    "'0.25..2.5 mm' is a range, '0.25..2.5 mm log' one of equally probable logarithms, '1.6 um +- 0.2 um' a mean and its standard deviation, "
     "{'measured': ['1.5 um', '1.7 um']} are measured values"
 )
 # between a mean and its standard deviation
@@ -31,7 +32,7 @@ _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*
 class Distribution:
     """A number that is not known exactly.
 
-    Every number of a range is equally probable. Of a mean and a standard deviation the
+    Every number of a range is equally probable, or with "log" every logarithm. Of a mean and a standard deviation the
     distribution is normal, without what is farther than four standard deviations from the
     mean. Each of the measured values is equally probable.
 
@@ -46,7 +47,7 @@ class Distribution:
     [1.337, 1.6, 1.863]
     """
 
-    kind: str  # "range", "normal" or "measured"
+    kind: str  # "range", "log", "normal" or "measured"
     numbers: tuple[
         float, ...
     ]  # both ends, mean and deviation, or the values as they rise
@@ -72,6 +73,8 @@ class Distribution:
         """The number that half of the draws exceed."""
         if self.kind == "normal":
             return self.numbers[0]
+        if self.kind == LOG:
+            return math.sqrt(self.numbers[0] * self.numbers[1])
         return float(np.median(self.numbers))
 
     def quantile(self, level: Any) -> FloatArray:
@@ -80,6 +83,11 @@ class Distribution:
         if self.kind == "range":
             low, high = self.numbers
             return np.asarray(low + (high - low) * levels)
+        if self.kind == LOG:
+            low, high = self.numbers
+            # the ends themselves without rounding
+            inside = np.clip(low * (high / low) ** levels, low, high)
+            return np.asarray(np.where(levels == 1, high, inside))
         if self.kind == "normal":
             from scipy.special import ndtr, ndtri
 
@@ -155,7 +163,8 @@ def _in_one_unit(
 
 
 def _range(name: str, text: str) -> Distribution:
-    pieces = text.split("..")
+    is_log = text.rstrip().endswith(f" {LOG}")
+    pieces = text.rstrip().removesuffix(LOG).split("..") if is_log else text.split("..")
     (low, high), unit = _in_one_unit(name, text, _parts(name, text, pieces[:2]))
     if len(pieces) > 2:
         raise InputError(f"{name} = {text[:60]!r} is no range of numbers: {FORMS}")
@@ -164,7 +173,9 @@ def _range(name: str, text: str) -> Distribution:
         raise InputError(
             f"{name} = {text[:60]!r}: the range {fault}, its smaller end is the first one"
         )
-    return Distribution("range", (low, high), unit, text)
+    if is_log and low <= 0:
+        raise InputError(f"{name} = {text[:60]!r}: logarithms are of positive numbers")
+    return Distribution(LOG if is_log else "range", (low, high), unit, text)
 
 
 def _normal(name: str, text: str) -> Distribution:

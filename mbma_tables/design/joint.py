@@ -73,6 +73,7 @@ from mbma_tables.design.uncertainty import (
 from mbma_tables.design.unknowns import OfOneMap, Unknowns, unknowns_of
 from mbma_tables.islands.island_models import beside
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.drawing import entries_of, with_area
 from mbma_tables.surfaces.roughness import TOPS
 from mbma_tables.surfaces.surface import Surface, assumptions
 from mbma_tables.theories import THEORIES, is_table, resolve, theory_text
@@ -158,6 +159,10 @@ class Joint(JointQuantities, Displayed):
         "0.25..2.5 mm", means with a standard deviation, "1.6 um +- 0.2 um", or measured
         values, {"measured": ["1.5 um", "1.7 um"]}. Tables and plots then have quantiles, as
         `uncertainty`; `central` is the joint of the medians.
+    assumed : dict
+        By place, the ranges of what a drawing does not state, with the source of each: of
+        parts that name their "process" and leave the Hurst exponent or the band of
+        wavelengths out, {"Ra": "1.6 um", "process": "milled"}, as of `Surface.from_drawing`.
 
     Raises
     ------
@@ -203,10 +208,12 @@ class Joint(JointQuantities, Displayed):
     surface: AnySurface = dataclasses.field(init=False)
     interface: Interface = dataclasses.field(init=False)
     inputs: dict[str, Distribution] = dataclasses.field(init=False)
+    assumed: dict[str, str] = dataclasses.field(init=False)
     _faces: dict[str, AnySurface] = dataclasses.field(init=False)
     _central: Joint | None = dataclasses.field(init=False)
 
     def __post_init__(self) -> None:
+        self._complete_drawings()
         inputs = dict(distributions_in(self._entries))
         object.__setattr__(self, "inputs", inputs)
         if inputs:
@@ -235,6 +242,21 @@ class Joint(JointQuantities, Displayed):
         interface = Interface(self.friction, self.direction, Gas.of(self.gas))
         object.__setattr__(self, "interface", interface)
         self._check()
+
+    def _complete_drawings(self) -> None:
+        """Take ranges for what drawings of the faces do not state, a face that names its process."""
+        assumed: dict[str, str] = {}
+        for name in FACES:
+            part, of_part = entries_of(getattr(self, name))
+            assumed |= {f"{name}.{key}": text for key, text in of_part.items()}
+            if of_part and self.nominal_area is None and "nominal_area" in part:
+                object.__setattr__(self, "nominal_area", part.pop("nominal_area"))
+            object.__setattr__(self, name, part)
+        if assumed and self.nominal_area is None:
+            area: dict[str, Any] = {}
+            with_area(area, assumed)
+            object.__setattr__(self, "nominal_area", area["nominal_area"])
+        object.__setattr__(self, "assumed", assumed)
 
     @property
     def _entries(self) -> dict[str, Any]:
@@ -967,7 +989,11 @@ class Joint(JointQuantities, Displayed):
         """The arguments of the joint, by name, and what its faces assume beyond them."""
         if self.inputs:
             typed = {name: each.text for name, each in self.inputs.items()}
-            return self.central.facts() | typed
+            facts = self.central.facts() | typed
+            lines = [f"{name} {text}" for name, text in self.assumed.items()]
+            if "assumed" in facts:
+                lines.append(facts["assumed"])
+            return facts | ({"assumed": "; ".join(lines)} if lines else {})
         facts = {}
         hardness = self.bodies.hardness
         if self.pair is not None:

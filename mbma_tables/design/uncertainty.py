@@ -36,6 +36,8 @@ from mbma_tables.contacts.quantities import registry
 from mbma_tables.contacts.quantities.declaration import DIMENSIONLESS
 from mbma_tables.contacts.result import Contact, panel_label
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.drawing import entries_of, with_area
+from mbma_tables.surfaces.roughness import spread_of_processes
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.base import Theory, UserTheory
 
@@ -49,6 +51,16 @@ DEGREE = 5  # of the polynomials whose variances are the shares of inputs
 MOST_DRAWS = 10**6
 # corners of the box of ranges are all looked at up to this number of inputs
 MOST_CORNERS = 8
+# kinds of spreads of processes by the model uncertainty of a quantity at a pressure
+SPREADS = {
+    "area_scatter": "area",
+    "separation_scatter": "gap",
+    "stiffness_scatter": "stiffness",
+    "unloading_stiffness_scatter": "stiffness",
+    "solid_conductance_scatter": "stiffness",
+    "total_conductance_scatter": "stiffness",
+    "gas_conductance_scatter": "gap",
+}
 Pressed = Callable[[Any], Contact]
 
 
@@ -103,6 +115,12 @@ def relative_scatter(pressed: Contact, name: str) -> Any:
     declared = registry.get(name)
     if declared.uncertainty is None or not declared.error_sign:
         return np.nan * pressed.mean_separation
+    kind = SPREADS.get(declared.uncertainty)
+    provenance = pressed.surface.provenance
+    spread = spread_of_processes(provenance, kind) if kind else 0.0
+    if spread > 0 and not np.isfinite(pressed.scatter_of(name)).all():
+        # no scatter is stated of faces of a process; maps of it have this one
+        return declared.error_sign * spread + 0 * pressed.mean_separation
     scatter = pressed.scatter_of(name)
     if registry.get(declared.uncertainty).dimension != DIMENSIONLESS:
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -346,6 +364,51 @@ class Uncertainty(Displayed):
         label = pressure_label(self.units["pressure"])
         return draw_panels(self.pressure[order], panels, label, title)
 
+    def what_to_measure(self, quantity: str | None = None) -> dict[str, FloatArray]:
+        """By how much the band of a quantity narrows if one number were known, the most helpful first.
+
+        Parameters
+        ----------
+        quantity : str, optional
+            Default: the first of `quantiles` whose inputs have the largest share.
+
+        Returns
+        -------
+        dict
+            By place, arrays over the pressures: the standard deviation of ln of the quantity
+            with the number known over that without, between 0 and 1. That of "model" is of a
+            simulated map of the face, which has no error of the law.
+
+        Raises
+        ------
+        InputError
+            For a quantity that is not among the quantiles.
+
+        Examples
+        --------
+        >>> from mbma_tables import Joint
+        >>> joint = Joint({"Ra": "1.6 um", "process": "milled"}, bodies="steel 1020 hard")
+        >>> found = joint.uncertainty("5 MPa", draws=500)
+        >>> list(found.what_to_measure("unloading_stiffness"))[:2]
+        ['part_a.longest', 'model']
+        """
+        if quantity is None:
+            quantity = max(self.shares, key=self._share_of_inputs)
+        if quantity not in self.shares:
+            raise InputError(
+                f"quantity must be one of {', '.join(self.shares)}, got {quantity!r}"
+            )
+        rest = {
+            name: np.sqrt(np.clip(1 - np.nan_to_num(share), 0, 1))
+            for name, share in self.shares[quantity].items()
+        }
+        return dict(sorted(rest.items(), key=lambda entry: float(entry[1].mean())))
+
+    def _share_of_inputs(self, quantity: str) -> float:
+        """The mean share of all inputs in the variance of a quantity."""
+        shares = self.shares[quantity]
+        return float(sum(np.mean(shares[name]) for name in self.inputs))
+
     def shares_text(self, name: str, k: int) -> str:
         """The shares in a quantity at the k-th pressure that are known, in whole percent."""
         percents = {
@@ -512,6 +575,9 @@ def _described(
             "surface is a Surface, or the arguments of Surface.from_roughness by name, "
             f"got {surface!r}"
         )
+    surface, assumed = entries_of(surface)
+    if assumed:
+        with_area(surface, assumed)
     given = {"surface": surface, "bodies": entries_of_bodies(bodies)}
 
     def make(numbers: Mapping[str, Any]) -> Pressed:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,7 @@ SLOPES = ("Rdq", "Sdq", "Rsm")
 WAVES = ("longest", "shortest")
 TOPS = ("h_max", "Sp", "nominal_area")
 ROUGHNESS = (*HEIGHTS, *SLOPES, *WAVES, "rolloff", *TOPS[1:], "process")
+UNKNOWN = "unknown"  # a process that is not named
 ASSUMED = (
     "heights are Gaussian and the surface is isotropic: measure a map of a ground, milled "
     "or worn face"
@@ -111,6 +112,22 @@ def processes() -> dict[str, dict[str, str]]:
         return {row["process"]: row for row in csv.DictReader(lines)}
 
 
+def spread_of_processes(provenance: Iterable[Mapping[str, Any]], kind: str) -> float:
+    """Standard deviation of ln of a law's answer for faces of the processes of a surface's records; 0 without one.
+
+    `kind` is "area", "gap" or "stiffness". It is that of maps of the process, whose skewed
+    heights, lay and spectrum Ra does not tell; of two faces the larger.
+    """
+    found = 0.0
+    for record in provenance:
+        process = record.get("process")
+        if process is not None:
+            found = max(found, float(processes()[process][f"{kind}_spread"]))
+        for face in record.get("of", ()):
+            found = max(found, spread_of_processes(face, kind))
+    return found
+
+
 def record_of_process(process: Any) -> dict[str, str]:
     """Entries of a surface's record: the process, and why a theory is not valid for it."""
     if process is None:
@@ -118,7 +135,13 @@ def record_of_process(process: Any) -> dict[str, str]:
     require_name("process", process, processes())
     row = processes()[process]
     record = {"process": process}
-    if float(row["valid"]) > 0:
+    if row["valid"] and float(row["valid"]) > 0:
+        return record
+    if process == UNKNOWN:
+        record["not_valid"] = (
+            "the process that made the face is not known, and of many processes no face is "
+            "Gaussian and isotropic: name the process, or measure a map"
+        )
         return record
     if int(row["maps"]):
         factor = math.exp(float(row["stiffness_error"]))

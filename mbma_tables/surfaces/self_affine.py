@@ -318,6 +318,60 @@ class SelfAffine(AnySurface):
         return cls.spectral(**numbers) if "C" in numbers else cls(**numbers)
 
     @classmethod
+    def from_drawing(
+        cls,
+        *,
+        process: str | None = None,
+        nominal_area: Any = None,
+        unit: str | None = None,
+        **numbers: Any,
+    ) -> Any:
+        """The surface of a drawing that gives little more than Ra: what is missing is assumed as a range.
+
+        The longest and the shortest wavelength come from the default filters of ISO 21920-3
+        for this Ra, the Hurst exponent from the process; each range has its source among the
+        "assumed" lines. The surface itself is that of the middle of all ranges, and is not
+        `valid`; `uncertainty` and `Joint` have the spread of the whole ranges.
+
+        Parameters
+        ----------
+        process : str, optional
+            What made the face, as for `from_roughness`; default: not known, with the widest
+            spread.
+        nominal_area : float or str, optional
+            A0 [length^2]; default: from 1 to 100 cm^2.
+        unit : str, optional
+            Unit of length of plain numbers.
+        **numbers
+            Those of `from_roughness` that the drawing gives, or the height Rz, from which Ra
+            is a range.
+
+        Returns
+        -------
+        Surface
+
+        Raises
+        ------
+        InputError, OutOfRangeError
+            Without a height or a unit, for arrays, and as `from_roughness`.
+
+        Examples
+        --------
+        >>> from mbma_tables import Surface, uncertainty
+        >>> face = Surface.from_drawing(Ra="1.6 um", process="milled")
+        >>> print(face.provenance[-1]["assumed"][1])
+        shortest 2.5..20 um log: lambda_s = 2.5 um, the default of ISO 21920-3 for this Ra, or the resolution of a coarser stylus
+        >>> found = uncertainty(face, "steel 1020", pressure="5 MPa", draws=200)
+        >>> low, _, high = found.quantiles["solid_conductance"][:, 0]
+        >>> bool(high > 2 * low), found.valid
+        (True, array([False]))
+        """
+        from mbma_tables.surfaces.drawing import surface_of_drawing
+
+        more = {"process": process, "nominal_area": nominal_area, "unit": unit}
+        return surface_of_drawing(cls, numbers | more)
+
+    @classmethod
     def named(cls, name: str) -> Self:
         """One of the paper's cases, in the paper's unit of length where it has one.
 

@@ -201,3 +201,45 @@ def test_failures_come_last_and_are_named(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
     with pytest.raises(InputError, match="no surface of this campaign is in"):
         dataset(tasks, tmp_path)
+
+
+def test_loads_of_large_surfaces_are_kept_one_by_one(tmp_path, monkeypatch):
+    import generate.boundary_elements.solve as solve
+
+    monkeypatch.setattr(solve, "WIDE_LOADS", (0.02, 0.1, 0.4))
+    for name in ("whole", "stopped"):
+        (tmp_path / name).mkdir()
+    whole = solve.simulate_wide(RECIPE, tmp_path / "whole")
+    press = solve.boundary_elements.Contact.press
+    pressed = []
+
+    def stopped(self, force):
+        if len(pressed) == 2:
+            raise KeyboardInterrupt
+        pressed.append(force)
+        return press(self, force)
+
+    monkeypatch.setattr(solve.boundary_elements.Contact, "press", stopped)
+    folder = tmp_path / "stopped"
+    with pytest.raises(KeyboardInterrupt):
+        solve.simulate_wide(RECIPE, folder)
+    path = folder / f"{RECIPE.name}.npz"
+    assert not solve.is_solved(path)
+    pressed.clear()
+    run(
+        [Task(RECIPE, TRAINING)],
+        folder,
+        solve=lambda one: solve.simulate_wide(one, folder),
+    )
+    # one load alone was left
+    assert pressed == [0.4]
+    assert solve.is_solved(path)
+    found = dataset([Task(RECIPE, TRAINING)], folder, "bandwidth")
+    for name in ("area", "mean_separation", "energy"):
+        np.testing.assert_allclose(found[name][0], whole[name], rtol=1e-3)
+    # the solver of this campaign against Tamaas
+    surface, _, _ = solve.prepared(heights(RECIPE), RECIPE.sizes, RECIPE.q0)
+    tamaas = Contact(surface, SQUARE)
+    for k, force in enumerate(found.force.values[0]):
+        other = tamaas.press(force)
+        assert other["area"] == pytest.approx(float(found.area[0, k]), rel=2e-3)

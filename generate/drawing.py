@@ -1,0 +1,168 @@
+"""``python -m generate drawing``: how far faces of a process are from what their Ra tells, and the coverage of bands."""
+
+import csv
+import io
+import pathlib
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import click
+import numpy as np
+from tqdm import tqdm
+
+from generate.files import dataset
+from generate.machined.campaign import parts, surface_of
+from generate.machined.makers import Part
+from mbma_tables import Surface, contact, uncertainty
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.files import write_file
+
+FILE = pathlib.Path("tables/processes.csv")
+SPREADS = {"area": "area", "gap": "mean_separation", "stiffness": "stiffness"}
+RANGE = (0.01, 0.6)  # A/A0 of the contacts that count
+HURST = 0.85  # the middle of what engineering surfaces have
+TOP = 4.5  # h_max/h_rms
+# Ra [um] to which maps are enlarged, in both directions alike
+HEIGHTS = (0.4, 0.8, 1.6, 3.2, 6.3)
+# spread of a process without maps over the largest of those with maps
+BEYOND = 1.1
+BAND = (0.025, 0.5, 0.975)
+DRAWS = 400
+
+
+class Reduced(NamedTuple):
+    """A simulated map and what a drawing would tell of it, lengths in sampling steps, E* = 1."""
+
+    family: str
+    Ra: float
+    longest: float
+    shortest: float
+    pressure: FloatArray
+    simulated: dict[str, FloatArray]  # by quantity
+    counts: Any  # mask of the loads
+
+
+def reduced(chosen: list[Part] | None = None) -> Iterator[Reduced]:
+    """Maps of the group machined, by default every one."""
+    data = dataset("machined")
+    families = data.family.values.astype(str)
+    for part in tqdm(parts() if chosen is None else chosen, disable=None):
+        values, surface = surface_of(part)
+        same = np.isclose(data.h_rms.values, float(surface.h_rms), rtol=2e-5)
+        (number,) = np.flatnonzero((families == part.family) & same)
+        one = data.isel(surface=number)
+        simulated = {
+            name: one[name].values.astype(float)
+            for name in SPREADS.values()
+            if name in one
+        }
+        area = simulated["area"]
+        yield Reduced(
+            part.family,
+            float(np.mean(np.abs(values - values.mean()))),
+            2 * np.pi / float(surface.longest),
+            float(part.shortest),
+            one.pressure.values.astype(float),
+            simulated,
+            (area >= RANGE[0]) & (area <= RANGE[1]),
+        )
+
+
+def errors(one: Reduced) -> dict[str, FloatArray]:
+    """ln of the law's answers, from Ra and the ends of the band, over the simulation's at equal pressure."""
+    face = Surface.from_roughness(
+        Ra=one.Ra,
+        hurst=HURST,
+        longest=max(one.longest, 3.01 * one.shortest),
+        shortest=one.shortest,
+        h_max=TOP * one.Ra * np.sqrt(np.pi / 2),
+    )
+    pressed = contact(face, pressure=one.pressure, theory="calibrated")
+    return {
+        kind: np.log(pressed.quantity(name) / one.simulated[name])[one.counts]
+        for kind, name in SPREADS.items()
+    }
+
+
+def spreads(maps: list[Reduced]) -> dict[str, dict[str, float]]:
+    """Root mean squares of the errors, by process and kind; under "" those of a process without maps."""
+    found: dict[str, dict[str, float]] = {}
+    for family in dict.fromkeys(one.family for one in maps):
+        own = [errors(one) for one in maps if one.family == family]
+        found[family] = {
+            kind: float(
+                np.sqrt(np.mean(np.concatenate([each[kind] for each in own]) ** 2))
+            )
+            for kind in SPREADS
+        }
+    largest = {kind: max(own[kind] for own in found.values()) for kind in SPREADS}
+    found[""] = {kind: BEYOND * spread for kind, spread in largest.items()}
+    return found
+
+
+def covered(one: Reduced, Ra: float) -> dict[str, float]:
+    """Shares of the loads at which the 95% band of Ra and the process has the simulated answer."""
+    step = Ra / one.Ra
+    names = list(SPREADS.values())
+    found = uncertainty(
+        {"Ra": f"{Ra} um", "process": one.family},
+        "1 GPa",
+        pressure=[f"{pressure!r} GPa" for pressure in one.pressure.tolist()],
+        theory="calibrated",
+        draws=DRAWS,
+        quantiles=BAND,
+        quantities=names,
+    )
+    lengths = {"area": 1.0, "mean_separation": step, "stiffness": 1 / step}
+    shares = {}
+    for name in names:
+        low, _, high = found.quantiles[name]
+        answer = one.simulated[name] * lengths[name]
+        shares[name] = float(((low < answer) & (answer < high))[one.counts].mean())
+    return shares
+
+
+def with_spreads(text: str, found: dict[str, dict[str, float]]) -> str:
+    """The file of processes with other spreads."""
+    lines = text.splitlines()
+    head = [line for line in lines if line.startswith("#")]
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    for row in rows:
+        own = found.get(row["process"], found[""])
+        row |= {f"{kind}_spread": f"{own[kind]:.3f}" for kind in SPREADS}
+    body = io.StringIO()
+    writer = csv.DictWriter(body, rows[0].keys(), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return "\n".join([*head, body.getvalue()])
+
+
+@click.command()
+@click.option("--write/--no-write", default=True, help="Write tables/processes.csv.")
+def drawing(write: bool) -> None:
+    """Compare simulated machined maps with what Ra and the process tell: five minutes."""
+    maps = list(reduced())
+    if write:
+        text = with_spreads(FILE.read_text(encoding="utf-8"), spreads(maps))
+        write_file(FILE, text.encode())
+    click.echo(
+        "shares of maps in the 95% band of Ra and process, by Ra [um] and quantity"
+    )
+    families = [*dict.fromkeys(one.family for one in maps)]
+    for Ra in HEIGHTS:
+        shares = [covered(one, Ra) for one in tqdm(maps, disable=None)]
+        all_maps = [
+            f"{np.mean([each[name] for each in shares]):.2f}" for name in SPREADS.values()
+        ]
+        click.echo(f"{Ra} um, all: {' '.join(all_maps)}")
+        for family in families:
+            own = [
+                each
+                for each, one in zip(shares, maps, strict=True)
+                if one.family == family
+            ]
+            row = [
+                f"{np.mean([each[name] for each in own]):.2f}"
+                for name in SPREADS.values()
+            ]
+            click.echo(f"{Ra} um, {family}: {' '.join(row)}")
