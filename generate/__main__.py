@@ -22,6 +22,7 @@ COMMANDS = {
         "generate.boundary_elements.run",
     ),
     **dict.fromkeys(("film", "tangential"), "generate.machined.studies"),
+    "adhesion": "generate.adhesion",
     "artefacts": "generate.machined.artefacts",
     "drawing": "generate.drawing",
     "edges": "generate.machined.edges",

@@ -16,6 +16,7 @@ from mbma_tables.common.errors import TableFileError as TableFileError
 if TYPE_CHECKING:
     from mbma_tables import theories as theories
     from mbma_tables.bodies import materials as materials
+    from mbma_tables.bodies.adhesion import Adhesion as Adhesion
     from mbma_tables.bodies.bodies import Bodies as Bodies
     from mbma_tables.common.chunks import in_chunks as in_chunks
     from mbma_tables.contacts.contact import contact as contact
@@ -43,6 +44,7 @@ __version__ = "0.2.0"
 
 _ERRORS = tuple(name for name in globals() if name.endswith("Error"))
 _HOMES = {
+    "Adhesion": "mbma_tables.bodies.adhesion",
     "Bodies": "mbma_tables.bodies.bodies",
     "Contact": "mbma_tables.contacts.result",
     "FlowFactors": "mbma_tables.effects.film",

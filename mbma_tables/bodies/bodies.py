@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.bodies import materials
+from mbma_tables.bodies.adhesion import AdhesionInUnits, adhesion_of
 from mbma_tables.bodies.materials import Metal, Pair
 from mbma_tables.common.arguments import (
     FloatArray,
@@ -74,6 +75,9 @@ class Bodies:
         bodies with different `nu`; plain numbers in the unit of `E_star`.
     conductivity : array_like or str, or pair of them, optional
         Of both bodies or of each, thermal "45 W/(m K)" or electrical "6e7 S/m"; for conductance.
+    adhesion : Adhesion, optional
+        Attraction between the bodies, `Adhesion(work="50 mJ/m^2", range="0.3 nm")`, or a
+        mapping of its arguments; of elastic bodies alone, not beside a hardness.
     metals : str, Metal, or pair of them, optional
         In place of `E_star`; names are those of `mbma_tables.bodies.materials.METALS`. Other
         constants that are not given are theirs.
@@ -101,8 +105,10 @@ class Bodies:
     E: Any = None
     conductivity: Any = None
     metals: Any = None
+    adhesion: Any = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "adhesion", adhesion_of(self.adhesion))
         for name, value in vars(self).items():
             if type(value) not in UNCHANGING:
                 object.__setattr__(self, name, detached(value))
@@ -229,7 +235,18 @@ class Bodies:
             largest = units.number("largest_pressure", largest)
             if isinstance(largest, float) or not is_labelled(largest):
                 largest = checked_largest(largest)[()]
-        return BodiesInUnits(self, E_star, hardness, units, largest)
+        if self.adhesion is None:
+            return BodiesInUnits(self, E_star, hardness, units, largest)
+        adhesion = AdhesionInUnits.of(self.adhesion, units)
+        in_units = BodiesInUnits(
+            self, E_star, hardness, units, largest, adhesion=adhesion
+        )
+        if adhesion is not None and in_units.yields:
+            raise InputError(
+                "adhesion and hardness were not simulated together: give hardness=inf for "
+                "bodies that stay elastic, or no adhesion"
+            )
+        return in_units
 
 
 def after(bodies: Bodies, largest_pressure: Any) -> Bodies:
@@ -273,6 +290,8 @@ class BodiesInUnits:
     largest: Any = None
     #: mean conductivity in place of that of `bodies`, as `conductivity` has it
     k_s: Any = None
+    #: None where the bodies do not attract each other
+    adhesion: AdhesionInUnits | None = None
 
     @property
     def pair(self) -> Pair | None:

@@ -27,6 +27,7 @@ from mbma_tables.contacts.question import GAPS, Question, both_separations
 from mbma_tables.contacts.result import Contact, Setup
 from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
 from mbma_tables.theories import resolve
+from mbma_tables.theories.adhesion import with_adhesion
 from mbma_tables.theories.base import (
     Gaps,
     Solved,
@@ -189,6 +190,8 @@ def _solved(
     theory = setup.theory
     if setup.bodies.yields:
         theory = with_hardness(theory, cap, modulus, largest)
+    elif setup.bodies.adhesion is not None:
+        theory = with_adhesion(theory, setup.bodies.adhesion, modulus)
     gaps = _separations(setup, theory, surface, question, modulus, cap)
     return theory.solved(surface, gaps, modulus), gaps
 
@@ -216,7 +219,7 @@ def _separations(
             gap >= -h_max,
             "at least -h_max, where the model ends at full compression",
         )
-    else:
+    elif name != "pressure" or setup.bodies.adhesion is None:
         require(name, gap, gap >= 0, "at least 0")
     if not is_gap:
         gap, lighter = _inverted(setup, theory, surface, question, modulus, cap)

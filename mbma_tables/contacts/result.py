@@ -43,6 +43,7 @@ from mbma_tables.contacts.quantities.validity import (
 from mbma_tables.contacts.question import GAPS, both_separations
 from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
 from mbma_tables.surfaces.surface import assumptions
+from mbma_tables.theories.adhesion import with_adhesion
 from mbma_tables.theories.base import Theory, TheoryAnswer
 from mbma_tables.theories.hardness import with_hardness
 
@@ -80,7 +81,9 @@ class Setup:
     interface: Interface = NOTHING_BETWEEN
 
     def theory_of(self, bodies: BodiesInUnits) -> Theory:
-        """The theory, with the bodies' hardness where they have one."""
+        """The theory, with the bodies' hardness or adhesion where they have one."""
+        if self.bodies.adhesion is not None:
+            return with_adhesion(self.theory, self.bodies.adhesion, bodies.E_star)
         if not self.bodies.yields:
             return self.theory
         broadcast_shape(**bodies.numbers)

@@ -162,6 +162,7 @@ def files_of(
     made_by = _made_by(target, options.made_by)
     if not isinstance(subject, Subject):
         return _of_rows(subject, program, options, out)
+    _refuse_adhesion(subject)
     units = _units(subject, program, options)
     _refuse(target, [key for key in given if key not in program.takes])
     if out is None and not program.alone:
@@ -341,6 +342,17 @@ def _units(subject: Subject, program: Target, options: Options) -> dict[str, str
             f"{program.name} is written in {' and '.join(program.units)}, got {' and '.join(map(str, asked))}"
         )
     return {"length_unit": asked[0], "stress_unit": asked[1]}
+
+
+def _refuse_adhesion(subject: Subject) -> None:
+    """An error for bodies that attract each other: programs press contacts that end at first touch."""
+    if subject.bodies is None or Bodies.of(subject.bodies).adhesion is None:
+        return
+    raise InputError(
+        "a contact with adhesion is not exported yet: pressures of exported laws begin with "
+        "the first contact; contact(..., pressure=[...]).to_dataset() has rows of every "
+        "quantity"
+    )
 
 
 def _refuse(target: str, names: list[str]) -> None:

@@ -31,6 +31,7 @@ FULLEST = 1 - 1e-12  # A/A0 above which contacts count as this full
 DEEP = 2.5
 DEEPEST = 1.25
 EDGE = 2 / 3  # power of a small gap that its share beside contact edges rises with
+SHARPNESS = 20.0
 FARTHEST = 3.0  # D up to which constants depend on it, a little beyond contacts simulated
 # held-out simulations: contact fractions, ranges over h_rms, and there the root mean square
 # errors of ln of the mean of exp(-g/range), by `python -m generate gaps --fit`
@@ -52,12 +53,12 @@ ALPHAS = (3.5, 400.0)  # of the surfaces simulated
 class GapConstants:
     """Constants of the distribution, fitted to boundary elements by `python -m generate gaps`."""
 
-    rise: float = 0.538
-    spread: float = 1.74
-    reach: float = 0.93
-    narrowing: float = 0.487
-    bend: float = 1.14
-    power: float = 0.585
+    rise: float = 0.539
+    spread: float = 1.75
+    reach: float = 0.931
+    narrowing: float = 0.496
+    bend: float = 1.13
+    power: float = 0.594
 
 
 CONSTANTS = GapConstants()
@@ -77,7 +78,12 @@ def level(u_over_h_rms: FloatArray, area: FloatArray) -> FloatArray:
 
     with np.errstate(divide="ignore"):
         of_area = -ndtri(np.minimum(area, FULLEST))
-    return np.asarray(np.minimum(of_area, np.maximum(DEEPEST * u_over_h_rms, DEEP)))
+    return _smaller(of_area, -_smaller(-DEEPEST * u_over_h_rms, -DEEP))
+
+
+def _smaller(one: FloatArray, other: ArrayLike) -> FloatArray:
+    """About the smaller of two numbers, smooth where they are equal: laws are derived from it."""
+    return -np.logaddexp(-SHARPNESS * one, -SHARPNESS * np.asarray(other)) / SHARPNESS
 
 
 def open_gaps(
@@ -118,7 +124,7 @@ def open_gaps(
     is_light = d > 0
     tail = np.where(is_light, covered + t * (1 - covered), (1 - covered) * (1 - t))
     y = np.where(is_light, 1.0, -1.0) * ndtri(tail) + d
-    scale = np.minimum(d, FARTHEST)
+    scale = _smaller(d, FARTHEST)
     c = constants.rise * np.log(np.maximum(constants.spread * nayak, 1.0))
     y1 = constants.reach * np.exp(-constants.narrowing * scale)
     k = constants.bend * nayak**constants.power

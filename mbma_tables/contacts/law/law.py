@@ -72,8 +72,10 @@ DIGITS = 10.0  # times a law's error: smaller decreases of stiffness are errors 
 
 
 def _refuse_energy_of_yielded(*gaps: Any, **named: Any) -> Numbers:
-    """In place of the method `energy` of laws with a hardness."""
-    raise InputError(f"energy needs an elastic contact: {ENERGY_OF_YIELDED}")
+    """In place of the method `energy` of laws with a hardness or adhesion."""
+    raise InputError(
+        f"energy needs an elastic contact without adhesion: {ENERGY_OF_YIELDED}"
+    )
 
 
 #: results of a law at separations: F/A0, A/A0, -dF/du and the energy, of their shape

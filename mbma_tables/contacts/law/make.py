@@ -142,9 +142,11 @@ def _one_surface(surface: AnySurface) -> AnySurface:
 
 
 def _elastic_law(setup: Setup, rtol: float) -> ContactLaw:
-    """The law of the same contact without a hardness."""
-    elastic = dataclasses.replace(setup.bodies.bodies, hardness=np.inf)
-    bodies = dataclasses.replace(setup.bodies, bodies=elastic, hardness=np.inf)
+    """The law of the same contact without a hardness and adhesion."""
+    elastic = dataclasses.replace(setup.bodies.bodies, hardness=np.inf, adhesion=None)
+    bodies = dataclasses.replace(
+        setup.bodies, bodies=elastic, hardness=np.inf, adhesion=None
+    )
     setup = dataclasses.replace(setup, bodies=bodies)
     return _law_of_theory(setup, setup.theory, rtol)
 
@@ -352,8 +354,8 @@ def _fitted_law(
     error_of_answers = float(np.concatenate(fitting.answer_errors).max())
     errors = errors + np.array([0.0, fitting.leverage * error_of_answers])
     elastic = None
-    if setup.bodies.yields:
-        # what follows unloading is calculated from the law without the hardness, on demand
+    if setup.bodies.yields or setup.bodies.adhesion is not None:
+        # what follows unloading is calculated from the law of the elastic contact, on demand
         elastic = functools.partial(_elastic_law, setup, tolerance)
     return ContactLaw(
         setup,

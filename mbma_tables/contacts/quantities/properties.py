@@ -78,7 +78,10 @@ class ContactQuantities:
 
     @property
     def unloading_stiffness(self) -> Numbers:
-        """-d(F/A0)/du [stress/length] of a small unloading at constant contact area; `stiffness` if nothing yields."""
+        """-d(F/A0)/du [stress/length] of a small unloading at constant contact area; `stiffness` if nothing yields.
+
+        Of bodies that attract each other it is the elastic one at this gap, without the change of the attraction.
+        """
         value: Numbers = self.quantity("unloading_stiffness")
         return value
 
@@ -171,6 +174,42 @@ class ContactQuantities:
     def median_gap(self) -> Numbers:
         """Median of the open gaps [length], by the law of docs/adhesion.md, of a simulated map by the map itself."""
         value: Numbers = self.quantity("median_gap")
+        return value
+
+    @property
+    def attraction(self) -> Numbers:
+        """Mean attraction that presses the contact beside the load [stress], effective less net pressure."""
+        value: Numbers = self.quantity("attraction")
+        return value
+
+    @property
+    def pull_off(self) -> Numbers:
+        """Largest tension F/A0 that the bodies bear, at least 0 [stress], of the surface and bodies."""
+        value: Numbers = self.quantity("pull_off")
+        return value
+
+    @property
+    def zero_load_gap(self) -> Numbers:
+        """Mean gap of the bodies at zero load [length], after they were pressed together."""
+        value: Numbers = self.quantity("zero_load_gap")
+        return value
+
+    @property
+    def zero_load_area(self) -> Numbers:
+        """A/A0 at zero load, after the bodies were pressed together."""
+        value: Numbers = self.quantity("zero_load_area")
+        return value
+
+    @property
+    def effective_work(self) -> Numbers:
+        """Work per nominal area of parting the bodies from zero load [stress length], the integral of the tension over u."""
+        value: Numbers = self.quantity("effective_work")
+        return value
+
+    @property
+    def tabor_number(self) -> Numbers:
+        """Tabor's number of a summit, (2 w^2/(c E*^2 rho^3))^(1/3) with the rms Laplacian c of the heights."""
+        value: Numbers = self.quantity("tabor_number")
         return value
 
     @property
@@ -502,6 +541,96 @@ class LawQuantities:
         value: Numbers = contact.quantity("median_gap")
         return value
 
+    def attraction(
+        self: Any,
+        mean_separation: ArrayLike | str | None = None,
+        *,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
+    ) -> Numbers:
+        """Mean attraction that presses the contact beside the load [stress], effective less net pressure."""
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
+        value: Numbers = contact.quantity("attraction")
+        return value
+
+    def pull_off(
+        self: Any,
+        mean_separation: ArrayLike | str | None = None,
+        *,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
+    ) -> Numbers:
+        """Largest tension F/A0 that the bodies bear, at least 0 [stress], of the surface and bodies."""
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
+        value: Numbers = contact.quantity("pull_off")
+        return value
+
+    def zero_load_gap(
+        self: Any,
+        mean_separation: ArrayLike | str | None = None,
+        *,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
+    ) -> Numbers:
+        """Mean gap of the bodies at zero load [length], after they were pressed together."""
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
+        value: Numbers = contact.quantity("zero_load_gap")
+        return value
+
+    def zero_load_area(
+        self: Any,
+        mean_separation: ArrayLike | str | None = None,
+        *,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
+    ) -> Numbers:
+        """A/A0 at zero load, after the bodies were pressed together."""
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
+        value: Numbers = contact.quantity("zero_load_area")
+        return value
+
+    def effective_work(
+        self: Any,
+        mean_separation: ArrayLike | str | None = None,
+        *,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
+    ) -> Numbers:
+        """Work per nominal area of parting the bodies from zero load [stress length], the integral of the tension over u."""
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
+        value: Numbers = contact.quantity("effective_work")
+        return value
+
+    def tabor_number(
+        self: Any,
+        mean_separation: ArrayLike | str | None = None,
+        *,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
+    ) -> Numbers:
+        """Tabor's number of a summit, (2 w^2/(c E*^2 rho^3))^(1/3) with the rms Laplacian c of the heights."""
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
+        value: Numbers = contact.quantity("tabor_number")
+        return value
+
     def scatter(
         self: Any,
         mean_separation: ArrayLike | str | None = None,
@@ -651,7 +780,10 @@ class JointQuantities:
         return value
 
     def unloading_stiffness(self: Any, pressure: ArrayLike | str) -> Numbers:
-        """-d(F/A0)/du [stress/length] of a small unloading at constant contact area; `stiffness` if nothing yields."""
+        """-d(F/A0)/du [stress/length] of a small unloading at constant contact area; `stiffness` if nothing yields.
+
+        Of bodies that attract each other it is the elastic one at this gap, without the change of the attraction.
+        """
         value: Numbers = self.at_pressure(pressure).quantity("unloading_stiffness")
         return value
 
@@ -732,6 +864,36 @@ class JointQuantities:
     def median_gap(self: Any, pressure: ArrayLike | str) -> Numbers:
         """Median of the open gaps [length], by the law of docs/adhesion.md, of a simulated map by the map itself."""
         value: Numbers = self.at_pressure(pressure).quantity("median_gap")
+        return value
+
+    def attraction(self: Any, pressure: ArrayLike | str) -> Numbers:
+        """Mean attraction that presses the contact beside the load [stress], effective less net pressure."""
+        value: Numbers = self.at_pressure(pressure).quantity("attraction")
+        return value
+
+    def pull_off(self: Any, pressure: ArrayLike | str) -> Numbers:
+        """Largest tension F/A0 that the bodies bear, at least 0 [stress], of the surface and bodies."""
+        value: Numbers = self.at_pressure(pressure).quantity("pull_off")
+        return value
+
+    def zero_load_gap(self: Any, pressure: ArrayLike | str) -> Numbers:
+        """Mean gap of the bodies at zero load [length], after they were pressed together."""
+        value: Numbers = self.at_pressure(pressure).quantity("zero_load_gap")
+        return value
+
+    def zero_load_area(self: Any, pressure: ArrayLike | str) -> Numbers:
+        """A/A0 at zero load, after the bodies were pressed together."""
+        value: Numbers = self.at_pressure(pressure).quantity("zero_load_area")
+        return value
+
+    def effective_work(self: Any, pressure: ArrayLike | str) -> Numbers:
+        """Work per nominal area of parting the bodies from zero load [stress length], the integral of the tension over u."""
+        value: Numbers = self.at_pressure(pressure).quantity("effective_work")
+        return value
+
+    def tabor_number(self: Any, pressure: ArrayLike | str) -> Numbers:
+        """Tabor's number of a summit, (2 w^2/(c E*^2 rho^3))^(1/3) with the rms Laplacian c of the heights."""
+        value: Numbers = self.at_pressure(pressure).quantity("tabor_number")
         return value
 
     def error(self: Any, pressure: ArrayLike | str) -> Numbers:

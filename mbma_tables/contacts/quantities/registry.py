@@ -25,6 +25,7 @@ MODULES = [
     "mbma_tables.contacts.quantities.conductances",
     "mbma_tables.contacts.quantities.leakage",
     "mbma_tables.contacts.quantities.gaps",
+    "mbma_tables.contacts.quantities.adhesion",
     "mbma_tables.contacts.quantities.uncertainty",
 ]
 

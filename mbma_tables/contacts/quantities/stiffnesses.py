@@ -20,6 +20,13 @@ ENERGY_OF_YIELDED = (
     "yielded points give back a part: at(...).energy has what a contact gives back"
 )
 
+NO_ADHESION = Need(
+    "bodies without adhesion",
+    lambda contact: contact.bodies.adhesion is None,
+    "effective_work is the work of parting bodies that attract each other; the energy of "
+    "their deformation alone is that of the same bodies without adhesion at the same gap",
+)
+
 POISSONS_RATIO = Need(
     "nu",
     lambda contact: contact.bodies.bodies.nu is not None,
@@ -44,7 +51,16 @@ def stiffness(contact: State) -> Any:
     is_listed=of_yielding_contacts,
 )
 def unloading_stiffness(contact: State) -> Any:
-    """-d(F/A0)/du [stress/length] of a small unloading at constant contact area; `stiffness` if nothing yields."""
+    """-d(F/A0)/du [stress/length] of a small unloading at constant contact area; `stiffness` if nothing yields.
+
+    Of bodies that attract each other it is the elastic one at this gap, without the change of the attraction.
+    """
+    if contact.bodies.adhesion is not None:
+        return contact.evaluate(
+            lambda theory, surface, u, E_star: (
+                E_star * theory.elastic.answer(surface, u).stiffness,
+            )
+        )[0]
     if not contact.yields:
         return contact.stiffness
     return (contact.E_star * contact.of_loading("unloading_stiffness"))[()]
@@ -67,6 +83,7 @@ def tangential_stiffness(contact: State) -> Any:
     "elastic energy per nominal area, which unloading gives back",
     uncertainty="scatter",
     error_sign=0,
+    needs=(NO_ADHESION,),
     is_column=False,
     is_listed=of_elastic_contacts,
 )

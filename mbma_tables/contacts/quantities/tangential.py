@@ -24,6 +24,7 @@ from mbma_tables.contacts.quantities.lay import stress_shares
 if TYPE_CHECKING:
     from mbma_tables.contacts.quantities.state import State
 
+OF_ADHESION = "slip of bodies that attract each other is not known: friction of what the attraction presses was not compared; `stiffness` of full stick is known"
 OF_LAY = "slip of a surface with a lay was not compared with simulations; `stiffness` of full stick is known"
 DIRECTIONS = ("along", "across")
 ISOTROPIC = 1.4  # anisotropy up to which the isotropic ratio is taken
@@ -199,6 +200,8 @@ def sheared(
     # elastically
     unloading = contact if direction is not None else contact.unloading()
     normal: State | str = unloading if direction is None else OF_LAY
+    if contact.bodies.adhesion is not None:
+        normal = OF_ADHESION
     return Tangential(
         ratio=ratio,
         friction=contact.interface.friction if friction is None else friction,

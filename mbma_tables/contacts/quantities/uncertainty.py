@@ -67,8 +67,9 @@ def unloading_stiffness_scatter(contact: State) -> Any:
     Also of the solid conductance and of the tangential stiffness, which are proportional to it.
     Without a hardness both stiffnesses are the same, and so are their uncertainties.
     """
+    is_its_own = contact.yields or contact.bodies.adhesion is not None
     return scatter_of_theory(
-        contact, "unloading_stiffness" if contact.yields else "stiffness"
+        contact, "unloading_stiffness" if is_its_own else "stiffness"
     )
 
 

@@ -300,8 +300,13 @@ def test_quantities_without_a_function_are_refused_by_name(thermal_time):
         elastic.export("c-law", quantity="psi")
 
 
-# quantities without rows: of separations, truth values, and what contacts that yield have not
-REFUSED = ("pressure", "separation", "valid", "stiffness_scatter", "median_gap")
+# quantities without rows: of separations, truth values, and what contacts that yield
+# have not, or bodies that do not attract each other
+REFUSED = (
+    *("pressure", "separation", "valid", "stiffness_scatter", "median_gap"),
+    *("attraction", "pull_off", "zero_load_gap", "zero_load_area", "effective_work"),
+    "tabor_number",
+)
 
 
 def test_rows_of_every_quantity_are_those_of_the_contact():

@@ -1,0 +1,203 @@
+"""`python -m generate adhesion`: contacts with an attraction by boundary elements, and what the theory answers.
+
+Rows are written as they are found; called again, it goes on where it was. Heights have an
+rms gradient of one and E* is one, so that pressures are over E* g; lengths are in h_rms.
+"""
+
+import csv
+import itertools
+import pathlib
+from collections.abc import Iterator
+from typing import Any
+
+import click
+import numpy as np
+import pandas as pd
+
+from generate import files
+from generate.boundary_elements.solve import load_at, prepared
+from generate.boundary_elements.surfaces import Recipe, heights
+from mbma_tables import Adhesion, Bodies, Surface, contact
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import ConvergenceError, MbmaError
+from mbma_tables.theories import adhesion as theory
+from mbma_tables.theories.simulated.adhesive import AdhesiveContact
+
+FILE = files.ROOT / "docs" / "data" / "adhesion.csv"
+# H, zeta_1, waves, seed, whether a constant may see it: eight points to the shortest wave
+SURFACES = (
+    (0.8, 8, 4, 11, True),
+    (0.3, 8, 4, 15, False),
+    (0.4, 16, 2, 12, True),
+    (0.9, 16, 2, 16, False),
+    (1.0, 8, 4, 13, True),
+    (0.6, 16, 2, 17, False),
+    (0.6, 8, 4, 14, True),
+    (0.2, 8, 4, 18, False),
+)
+POINTS = 256
+RANGES = (0.03, 0.1, 0.3, 1.0)  # over h_rms
+TABOR = (0.1, 0.2, 0.35, 0.5)
+AREAS = (0.002, 0.006, 0.02, 0.06, 0.15, 0.3, 0.55, 0.8)  # of elastic loads, about
+TOLERANCE = 1e-6
+LOADING = 0.02  # steps of pull-off, relative
+COLUMNS = (
+    *("hurst", "zeta_1", "waves", "seed", "fitted", "range", "tabor", "work"),
+    *("contact_pressure", "net_pressure", "area", "area_raw", "area_compressed"),
+    *("mean_separation", "elastic_area", "elastic_separation", "renewals"),
+)
+
+
+def solved(row: tuple[Any, ...], known: set[tuple[float, ...]]) -> Iterator[list[Any]]:
+    """Contacts of one surface that are not known yet."""
+    hurst, zeta_1, waves, seed, fitted = row
+    recipe = Recipe("self_affine", hurst, zeta_1, waves, seed, POINTS)
+    surface, _, _ = prepared(heights(recipe), recipe.sizes, recipe.q0)
+    h_rms = float(surface.std())
+    face = Surface.from_map(surface, dx=1 / POINTS, periodic=True)
+    for length, number in itertools.product(RANGES, TABOR):
+        if (seed, length, number) in known:
+            continue
+        rho = length * h_rms
+        curvature = np.sqrt(theory.LAPLACIAN * float(face.m4))
+        work = float(np.sqrt(number**3 * curvature * rho**3 / 2))
+        yield from _contacts(
+            (*row[:4], int(fitted), length, number, work / h_rms),
+            face,
+            surface,
+            work,
+            rho,
+        )
+
+
+def _contacts(
+    node: tuple[Any, ...], face: Any, surface: FloatArray, work: float, rho: float
+) -> Iterator[list[Any]]:
+    h_rms = float(surface.std())
+    engine = AdhesiveContact(
+        surface, (1.0, 1.0), lambda gap: work / rho * np.exp(-gap / rho), TOLERANCE
+    )
+    for share in reversed(AREAS):
+        load = load_at(share, np.inf)
+        try:
+            found = engine.press(load)
+        except ConvergenceError:
+            yield [*node, load, *[np.nan] * 8]
+            continue
+        elastic = [np.nan, np.nan]
+        if found["net_pressure"] > 0:
+            free = contact(face, pressure=found["net_pressure"], theory="simulated")
+            elastic = [float(free.area), float(free.mean_separation) / h_rms]
+        yield [
+            *node,
+            load,
+            found["net_pressure"],
+            *(found[name] for name in ("area", "area_raw", "area_compressed")),
+            found["mean_separation"] / h_rms,
+            *elastic,
+            found["renewals"],
+        ]
+
+
+def answered(rows: pd.DataFrame, name: str, share: float) -> pd.DataFrame:
+    """What a theory answers at the net pressures of simulations, with a share of the traction in contact.
+
+    Areas over A0, gaps and their scatter in h_rms; NaN where it refuses.
+    """
+    kept = theory.THETA
+    theory.THETA = share
+    try:
+        found = [_answer(row, name) for row in rows.itertuples()]
+    finally:
+        theory.THETA = kept
+    columns = ["area", "gap", "area_scatter", "gap_scatter", "valid"]
+    return pd.DataFrame(found, columns=columns, index=rows.index)
+
+
+_FACES: dict[Any, Any] = {}
+
+
+def face_of(row: Any, name: str) -> Any:
+    """The map for "simulated", the numbers of the surface for other theories; rms gradient one."""
+    key = (row.seed, name)
+    if key not in _FACES:
+        recipe = Recipe(
+            "self_affine", row.hurst, row.zeta_1, int(row.waves), int(row.seed), POINTS
+        )
+        surface, _, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
+        if name == "simulated":
+            _FACES[key] = Surface.from_map(surface, dx=1 / POINTS, periodic=True)
+        else:
+            h_rms = float(surface.std())
+            h_max = float(known["h_max"]) * h_rms
+            q0 = recipe.q0
+            _FACES[key] = Surface(row.hurst, q0, q0 * row.zeta_1, h_rms, h_max)
+    return _FACES[key]
+
+
+def _answer(row: Any, name: str) -> list[Any]:
+    face = face_of(row, name)
+    h_rms = float(face.h_rms)
+    attraction = Adhesion(row.work * h_rms, row.range * h_rms)
+    try:
+        pressed = contact(
+            face, Bodies(1.0, adhesion=attraction), pressure=row.net_pressure, theory=name
+        )
+    except MbmaError:
+        return [np.nan] * 4 + [False]
+    return [
+        float(pressed.area),
+        float(pressed.mean_separation) / h_rms,
+        float(pressed.area_scatter),
+        float(pressed.separation_scatter) / h_rms,
+        bool(pressed.valid),
+    ]
+
+
+@click.command()
+@click.option(
+    "--data", type=click.Path(path_type=pathlib.Path), default=FILE, show_default=True
+)
+@click.option("--compare", is_flag=True, help="Print errors of the theory, no runs.")
+def adhesion(data: pathlib.Path, compare: bool) -> None:
+    """Solve contacts with an attraction, half an hour on one core; `--compare` with the theory."""
+    if compare:
+        _compare(pd.read_csv(data, comment="#"))
+        return
+    known: set[tuple[float, ...]] = set()
+    if data.exists():
+        rows = pd.read_csv(data, comment="#")
+        counts = rows.groupby(["seed", "range", "tabor"]).size()
+        known = {key for key, count in counts.items() if count == len(AREAS)}
+        whole = [
+            key in known for key in zip(rows.seed, rows.range, rows.tabor, strict=True)
+        ]
+        rows = rows[whole]
+    else:
+        rows = pd.DataFrame(columns=list(COLUMNS))
+    rows.to_csv(data, index=False, lineterminator="\n", float_format="%.8g")
+    with data.open("a", encoding="utf-8", newline="") as opened:
+        writer = csv.writer(opened, lineterminator="\n")
+        for surface in SURFACES:
+            for row in solved(surface, known):
+                writer.writerow([f"{value:.8g}" for value in row])
+                opened.flush()
+
+
+def _compare(rows: pd.DataFrame) -> None:
+    pressed = rows[rows.net_pressure > 0]
+    for name, share in itertools.product(
+        ("simulated", "calibrated"), (0.0, 0.25, 0.5, theory.THETA)
+    ):
+        found = answered(pressed, name, share)
+        error_of_area = np.log(found.area / pressed.area)
+        error_of_gap = np.log(found.gap / pressed.mean_separation)
+        for fitted, number in itertools.product((1, 0), TABOR):
+            chosen = (pressed.tabor == number) & (pressed.fitted == fitted)
+            chosen &= pressed.mean_separation > 0.01
+            area, gap = error_of_area[chosen].abs(), error_of_gap[chosen].abs()
+            click.echo(
+                f"{name} theta {share:g} fitted {fitted} tabor {number:g}: "
+                f"{chosen.sum()} contacts, area {area.median():.3f} {area.quantile(0.9):.3f}, "
+                f"gap {gap.median():.3f} {gap.quantile(0.9):.3f}"
+            )

@@ -1,0 +1,413 @@
+"""Any theory with an attraction between the bodies: the elastic contact at a larger pressure.
+
+Where the attraction is soft, by Tabor's number at the scale of summits, the contact has the
+area, the gaps and so the stiffness of the elastic one at the pressure ::
+
+    p_e = p + (w/rho) (L + theta s(0) A/A0),   L = mean of s(g/rho) where the contact is open
+
+with the work of adhesion w, the range rho and the traction w/rho s(g/rho) at a gap g. That in
+the contact is balanced there, and deforms nothing but for a share theta near edges. The mean over gaps is
+that of the elastic theory (`gap_law`, or a simulated map).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mbma_tables.bodies.adhesion import AdhesionInUnits
+from mbma_tables.common.arguments import FloatArray, describe_entries
+from mbma_tables.common.errors import OutOfRangeError
+from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.theories import gap_law
+from mbma_tables.theories.base import Theory, TheoryAnswer
+from mbma_tables.theories.inversion import Indices
+
+# share of the traction in contact that deforms, fitted to simulations by `python -m generate
+# adhesion`
+THETA = 0.25
+# Tabor's number and range over h_rms up to which, and from which on, simulations agree
+MOST_TABOR = 0.4
+LEAST_RANGE = gap_law.RANGES[0]
+# standard deviation of ln A and of the gap over h_rms that the attraction adds, there
+AREA_ERROR = 0.02
+MAP_ERROR = (
+    0.03  # of the gaps of a simulated map, on 8 points to the shortest wave and more
+)
+STEP = 1e-3  # relative, of mean gaps for slopes
+LOOKS = 48  # mean gaps at which a contact is looked for
+SMALLEST_GAP = 1e-10  # of them, over h_rms
+FARTHEST = 12.0  # and the largest, likewise, where contact has no end
+SECTIONS = 30  # of the interval that holds pull-off
+MOST_STEPS = 60
+PARTING_NODES = 64
+ROUNDING = 1e-13  # relative, of net pressures that are found
+LAPLACIAN = 8 / 3  # mean square of the Laplacian over m4, of isotropic surfaces
+LEAST_SHARE = 1e-3  # of the attraction at zero load, the least net pressure of laws
+SIMULATE = (
+    "its contact edges neck, and area and force depend on the path; no theory answers this "
+    "yet, a smoother face, a smaller work or a longer range is covered"
+)
+
+
+def with_adhesion(
+    theory: Theory, adhesion: AdhesionInUnits, E_star: ArrayLike = 1.0
+) -> Theory:
+    """The theory of bodies that attract each other.
+
+    Parameters
+    ----------
+    theory : Theory
+        The elastic one.
+    adhesion : AdhesionInUnits
+        In the unit of `E_star` and of the surface's lengths; its work is positive.
+    E_star : array_like
+        Effective modulus.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mbma_tables import Adhesion, Surface
+    >>> from mbma_tables.bodies.adhesion import AdhesionInUnits
+    >>> from mbma_tables.common.units import Units
+    >>> from mbma_tables.theories import resolve
+    >>> from mbma_tables.theories.adhesion import with_adhesion
+    >>> surface = Surface(hurst=0.8, q0=0.1, q1=1.6, h_rms=1.0, h_max=3.5)
+    >>> attraction = AdhesionInUnits.of(Adhesion(1e-3, 0.3), Units(stress="1"))
+    >>> sticky = with_adhesion(resolve("calibrated"), attraction)
+    >>> f"pull-off at {float(sticky.pull_off(surface)[0]):.2g} E*"
+    'pull-off at 1.6e-06 E*'
+    """
+    return Adhesive(theory, adhesion, E_star)
+
+
+class Adhesive(Theory):
+    """A theory with an attraction; u is the mean gap, pressures are net ones."""
+
+    elastic: Any = None
+
+    def __init__(
+        self, theory: Theory, adhesion: AdhesionInUnits, E_star: ArrayLike = 1.0
+    ) -> None:
+        self.elastic = theory
+        self.adhesion = adhesion
+        self.modulus = np.asarray(E_star, dtype=float)
+        self.name = theory.name
+        self.ends_at_h_max = False
+        self.looks = theory.looks
+
+    def at(self, shape: tuple[int, ...], place: Indices) -> Theory:
+        if self.modulus.ndim == 0:
+            return self
+        chosen = np.broadcast_to(self.modulus, shape).ravel()[
+            np.asarray(place).astype(np.intp)
+        ]
+        return Adhesive(self.elastic, self.adhesion, chosen)
+
+    @property
+    def _traction(self) -> FloatArray:
+        """w/rho over E*."""
+        return np.asarray(self.adhesion.work / self.adhesion.range / self.modulus)
+
+    def pull(
+        self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
+    ) -> FloatArray:
+        """Effective less net pressure over E* at mean gaps and areas of the elastic contact."""
+        share, gap = self.elastic.open_gaps(surface, mean_separation, area)
+        shape = self.adhesion.shape
+        decay = (share * shape(gap / self.adhesion.range)).sum(axis=-1)
+        in_contact = THETA * float(shape(np.zeros(1))[0]) * area
+        return np.asarray(self._traction * (decay + in_contact))
+
+    def decay(
+        self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
+    ) -> FloatArray:
+        """Mean of the traction over w/rho where the contact is open."""
+        share, gap = self.elastic.open_gaps(surface, mean_separation, area)
+        return np.asarray(
+            (share * self.adhesion.shape(gap / self.adhesion.range)).sum(axis=-1)
+        )
+
+    def net(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
+        """Net pressure over E* at mean gaps."""
+        answer = self.elastic.answer(surface, mean_separation)
+        return np.asarray(
+            answer.pressure - self.pull(surface, mean_separation, answer.area)
+        )
+
+    def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
+        """Net pressure, area and -dp/du at mean separations u [length]."""
+        u = np.asarray(mean_separation, dtype=float)
+        u = np.broadcast_to(u, np.broadcast_shapes(u.shape, self.modulus.shape))
+        steps = np.stack([u, u * (1 - STEP), u * (1 + STEP)])
+        elastic = self.elastic.answer(surface, steps)
+        pull = self.pull(surface, steps, elastic.area)
+        pressure, area, stiffness, error = (field[0] for field in elastic)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            steep = stiffness + (pull[2] - pull[1]) / (2 * STEP * u)
+            net = pressure - pull[0]
+            # errors of the elastic force pass on to the net one, which may vanish
+            passed_on = error * (pressure + pull[0]) / np.abs(net)
+        return TheoryAnswer(net, area, np.where(u > 0, steep, stiffness), passed_on)
+
+    def _range_of_gaps(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
+        """Mean gaps between which contacts at pressures are looked for."""
+        h_rms = np.asarray(surface.h_rms, dtype=float)
+        low, high = self.elastic.interval(surface)
+        farthest = np.minimum(high, FARTHEST * h_rms) + 8 * self.adhesion.range
+        if self.elastic.ends_at_h_max:
+            return np.maximum(low, SMALLEST_GAP * h_rms), farthest
+        return np.maximum(low, SMALLEST_GAP * h_rms), np.minimum(farthest, high)
+
+    def _looked_at(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
+        """Mean gaps on a first axis, rising, of surfaces and moduli, and net pressures there."""
+        low, high = self._range_of_gaps(surface)
+        shape = np.broadcast_shapes(surface.shape, self.modulus.shape)
+        share = np.linspace(0.0, 1.0, LOOKS).reshape(-1, *(1,) * len(shape))
+        u = np.broadcast_to(low * (high / low) ** share, (LOOKS, *shape))
+        return u, self.net(surface, u)
+
+    def pull_off(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
+        """Tension over E* at which the bodies part, at least 0, and the mean gap there [length].
+
+        It is the largest tension of the contact as its gap grows.
+        """
+        u, net = self._looked_at(surface)
+        lowest = np.clip(net.argmin(axis=0), 1, LOOKS - 2)
+        left, right = (
+            np.log(np.take_along_axis(u, (lowest + k)[None], 0)[0]) for k in (-1, 1)
+        )
+        # golden sections between both neighbours of the lowest look
+        golden = (np.sqrt(5) - 1) / 2
+        for _ in range(SECTIONS):
+            inner = right - golden * (right - left), left + golden * (right - left)
+            values = self.net(surface, np.exp(np.stack(inner)))
+            falls = values[0] > values[1]
+            left = np.where(falls, inner[0], left)
+            right = np.where(falls, right, inner[1])
+        parting = np.exp((left + right) / 2)
+        return np.maximum(-self.net(surface, parting), 0.0), parting
+
+    def free_gap(self, surface: AnySurface) -> FloatArray:
+        """Mean gap at zero load [length]."""
+        return self.inverted(surface, "pressure", np.asarray(0.0))[0]
+
+    def parting_work(self, surface: AnySurface) -> FloatArray:
+        """Integral of the tension over E* [length] from the gap at zero load to bodies apart."""
+        free = self.free_gap(surface)
+        node, weight = np.polynomial.legendre.leggauss(PARTING_NODES)
+        share = ((node + 1) / 2).reshape(-1, *(1,) * free.ndim)
+        weights = (weight / 2).reshape(share.shape)
+        width = self._range_of_gaps(surface)[1] - free
+        # denser towards small gaps, where the tension is
+        u = free + width * share**3
+        tension = -self.net(surface, u)
+        return np.asarray((tension * weights * 3 * share**2 * width).sum(axis=0))
+
+    def inverted(
+        self, surface: AnySurface, quantity: str, wanted: FloatArray
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """Mean separation [length] at a net pressure over E* or an area.
+
+        At a pressure it is that of the closest contact, which is stable.
+        """
+        if quantity == "area":
+            found: tuple[FloatArray, NDArray[np.bool_]] = self.elastic.inverted(
+                surface, quantity, wanted
+            )
+            return found
+        u, net = self._looked_at(surface)
+        shape = np.broadcast_shapes(np.shape(wanted), net.shape[1:])
+        goal = np.broadcast_to(wanted, shape)
+        every = (-1, *(1,) * (goal.ndim - net.ndim + 1), *net.shape[1:])
+        looks, net = (
+            np.broadcast_to(each.reshape(every), (LOOKS, *shape)) for each in (u, net)
+        )
+        below = net < goal
+        if below[0].any():
+            self._refuse_closed(goal, below[0])
+        first = below.argmax(axis=0)
+        low = np.take_along_axis(looks, np.maximum(first - 1, 0)[None], 0)[0]
+        high = np.take_along_axis(looks, first[None], 0)[0]
+        reached = np.asarray(below.any(axis=0))
+        if not reached.all():
+            # between the looks beside pull-off
+            parting = np.broadcast_to(self._parting(surface, goal, reached), shape)
+            before = np.clip((looks < parting).sum(axis=0) - 1, 0, LOOKS - 1)
+            nearest = np.take_along_axis(looks, before[None], 0)[0]
+            low, high = np.where(reached, low, nearest), np.where(reached, high, parting)
+        root = self._between(surface, goal, np.log(low), np.log(high))
+        return root, np.zeros(shape, bool)
+
+    def _parting(
+        self, surface: AnySurface, goal: FloatArray, reached: NDArray[np.bool_]
+    ) -> FloatArray:
+        """Mean gap of pull-off, beyond which goals lie that no look reached; an error where none does."""
+        most, parting = self.pull_off(surface)
+        beyond = np.asarray(~reached & (goal < -most))
+        if beyond.any():
+            tension = np.broadcast_to(-most * self.modulus, goal.shape)
+            raise OutOfRangeError(
+                "pressure must be at least that at which the bodies part, "
+                f"{describe_entries(tension, beyond)}",
+                beyond,
+            )
+        return parting
+
+    def _refuse_closed(self, goal: FloatArray, closed: NDArray[np.bool_]) -> None:
+        """An error for contacts whose gaps the attraction or the pressure closes altogether."""
+        raise OutOfRangeError(
+            f"pressure over E* {describe_entries(goal, closed)} closes all gaps of this "
+            f"surface by theory {self.name!r}, with this attraction: a mean gap of at least "
+            f"{SMALLEST_GAP:g} h_rms is looked for",
+            closed,
+        )
+
+    def _between(
+        self, surface: AnySurface, goal: FloatArray, low: FloatArray, high: FloatArray
+    ) -> FloatArray:
+        """Mean gap at a net pressure, between logarithms of gaps, by the Illinois method."""
+        more = self.net(surface, np.exp(low)) - goal
+        less = self.net(surface, np.exp(high)) - goal
+        scale = np.abs(goal) + more - less
+        root = (low + high) / 2
+        raised = np.zeros(np.shape(low))  # the side that the step before moved
+        for _ in range(MOST_STEPS):
+            with np.errstate(invalid="ignore", divide="ignore"):
+                secant = low + (high - low) * more / (more - less)
+            root = np.where(np.isfinite(secant), secant, root)
+            value = self.net(surface, np.exp(root)) - goal
+            if (np.abs(value) <= ROUNDING * scale).all():
+                break
+            above = value > 0
+            # the end that stays for a second step counts half
+            less = np.where(above, np.where(raised > 0, less / 2, less), value)
+            more = np.where(above, value, np.where(raised < 0, more / 2, more))
+            low = np.where(above, root, low)
+            high = np.where(above, high, root)
+            raised = np.where(above, 1.0, -1.0)
+        return np.exp(root)
+
+    def interval(
+        self, surface: AnySurface, quantity: str = "pressure"
+    ) -> tuple[FloatArray, FloatArray]:
+        """Mean separations between which the net pressure is positive, and falls."""
+        low, _ = self.elastic.interval(surface, quantity)
+        if quantity != "pressure":
+            found: tuple[FloatArray, FloatArray] = self.elastic.interval(
+                surface, quantity
+            )
+            return found
+        free, _ = self.inverted(surface, "pressure", np.zeros(surface.shape))
+        # laws are of the logarithm of the net pressure
+        area = self.elastic.answer(surface, free).area
+        least = LEAST_SHARE * self.pull(surface, free, area)
+        highest, _ = self.inverted(surface, "pressure", least)
+        return low, highest
+
+    def domain(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
+        """That of the elastic theory."""
+        domain: tuple[FloatArray, FloatArray] = self.elastic.domain(surface)
+        return domain
+
+    def open_gaps(
+        self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Those of the elastic contact."""
+        gaps: tuple[FloatArray, FloatArray] = self.elastic.open_gaps(
+            surface, mean_separation, area
+        )
+        return gaps
+
+    def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
+        """Elastic energy over A0 E* [length], of the deformation alone."""
+        return np.asarray(self.elastic.energy(surface, mean_separation))
+
+    def heights(self, surface: AnySurface) -> Any:
+        return self.elastic.heights(surface)
+
+    def gaps(self) -> Any:
+        return self.elastic.gaps()
+
+    def bends(self, surface: AnySurface) -> FloatArray:
+        return np.asarray(self.elastic.bends(surface))
+
+    def provenance(self) -> tuple[str, ...]:
+        lines: tuple[str, ...] = self.elastic.provenance()
+        return lines
+
+    def reasons_of_flow(self) -> tuple[str, ...]:
+        reasons: tuple[str, ...] = self.elastic.reasons_of_flow()
+        return reasons
+
+    def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
+        """Standard deviation against simulations: of the elastic theory, of the gaps, of the attraction.
+
+        "pressure" is that of the effective pressure at equal u over the net pressure, which
+        may vanish. The stiffness was not compared: NaN; that of unloading is elastic.
+        """
+        if quantity == "unloading_stiffness":
+            return np.asarray(self.elastic.scatter(surface, "stiffness", area))
+        elastic = np.asarray(self.elastic.scatter(surface, quantity, area))
+        if quantity not in ("pressure", "area"):
+            return np.full(elastic.shape, np.nan)
+        u = np.asarray(self.elastic.inverted(surface, "area", area)[0])
+        steps = np.stack([u, u * (1 - STEP), u * (1 + STEP)])
+        answer = self.elastic.answer(surface, steps)
+        pull = self.pull(surface, u, area)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            net = answer.pressure[0] - pull
+            of_gaps = pull * self._scatter_of_gaps(surface, area) / answer.pressure[0]
+            if quantity == "pressure":
+                whole = np.hypot(elastic, of_gaps) * answer.pressure[0]
+                return np.asarray(whole / np.abs(net))
+            rises = np.log(answer.area[1] / answer.area[2]) / np.log(
+                answer.pressure[1] / answer.pressure[2]
+            )
+        return np.asarray(np.sqrt(elastic**2 + (rises * of_gaps) ** 2 + AREA_ERROR**2))
+
+    def _scatter_of_gaps(self, surface: AnySurface, area: FloatArray) -> FloatArray:
+        """Standard deviation of ln of the attraction of open gaps, of known mean gap and area."""
+        over = self.adhesion.width / np.asarray(surface.h_rms)
+        if self.elastic.gaps() is None:
+            return gap_law.scatter_of_decay(area, over)
+        return np.full(np.shape(area), MAP_ERROR)
+
+    def tabor(self, surface: AnySurface) -> FloatArray:
+        """Tabor's number of a summit, (2 w^2/(c E*^2 rho^3))^(1/3), c the rms Laplacian of heights."""
+        curvature = np.sqrt(LAPLACIAN * np.asarray(surface.m4))
+        own = self.adhesion
+        return np.asarray(
+            np.cbrt(2 * (own.work / self.modulus) ** 2 / (curvature * own.width**3))
+        )
+
+    def reasons(
+        self,
+        surface: AnySurface,
+        answer: TheoryAnswer,
+        mean_separation: FloatArray,
+    ) -> Mapping[str, Any]:
+        shape = np.shape(answer.area)
+        elastic = self.elastic.answer(surface, np.asarray(mean_separation, dtype=float))
+        own = self.elastic.reasons(surface, elastic, mean_separation)
+        stiff = np.broadcast_to(self.tabor(surface) > MOST_TABOR, shape)
+        over = self.adhesion.width / np.asarray(surface.h_rms)
+        short = np.broadcast_to(over < LEAST_RANGE, shape)
+        other = np.full(shape, not self.adhesion.is_exponential)
+        reasons = {
+            f"adhesion: Tabor's number of a summit is above {MOST_TABOR:g}, where {SIMULATE}": stiff,
+            f"adhesion: the range is below {LEAST_RANGE:g} h_rms, the shortest of gaps that were simulated": short,
+            "adhesion: only an exponential traction was simulated": other,
+            "adhesion: the contact is beyond pull-off, where it is stable at a given gap alone": (
+                answer.stiffness < 0
+            ),
+        }
+        by_law = (
+            {}
+            if self.elastic.gaps() is not None
+            else gap_law.untested(surface.alpha, answer.area)
+        )
+        return {**own, **by_law, **reasons}

@@ -1,0 +1,191 @@
+"""Contacts with an attraction: identities, limits, and boundary elements that no constant was fitted to."""
+
+import functools
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.integrate import quad
+
+from generate import files
+from mbma_tables import Adhesion, Bodies, Joint, Surface, contact, contact_law
+from mbma_tables.common.errors import InputError, MissingError, OutOfRangeError
+from mbma_tables.common.units import Units
+from mbma_tables.theories.adhesion import MOST_TABOR, THETA
+
+FACE = Surface(hurst=0.8, q0=0.1, q1=1.6, h_rms=0.1, h_max=0.35, unit="um")
+WORK, RANGE = "10 mJ/m^2", "10 nm"
+STICKY = Bodies("1 GPa", adhesion=Adhesion(WORK, RANGE))
+pressed = functools.partial(contact, FACE, theory="calibrated")
+
+
+def test_without_work_it_is_the_theory_to_the_last_bit():
+    loads = [1e-4, 1e-3, 0.01]
+    plain = pressed("1 GPa", pressure=loads)
+    none = pressed(Bodies("1 GPa", adhesion=Adhesion(0, RANGE)), pressure=loads)
+    for name, variable in plain.variables().items():
+        assert np.array_equal(variable.values, none.quantity(name), equal_nan=True), name
+
+
+@pytest.mark.parametrize("theory", ["calibrated", "persson", "mbma"])
+def test_the_net_pressure_is_the_elastic_one_less_the_attraction(theory):
+    """Against the elastic contact's own gaps, area and pressure."""
+    u = np.array([0.08, 0.15, 0.25])
+    elastic = contact(FACE, "1 GPa", mean_separation=u, theory=theory)
+    sticky = contact(FACE, STICKY, mean_separation=u, theory=theory)
+    strength = 10e-3 / 10e-9 / 1e9  # GPa
+    near = elastic.gap_mean(lambda gap: np.exp(-gap / 0.01))
+    expected = elastic.pressure - strength * (near + THETA * elastic.area)
+    assert sticky.pressure == pytest.approx(expected, rel=1e-9, abs=1e-15)
+    assert sticky.area == pytest.approx(elastic.area, rel=1e-12)
+    assert sticky.gap_mean(np.abs) == pytest.approx(u, rel=1e-9)
+    step = 1e-5
+    slope = [contact(FACE, STICKY, mean_separation=x, theory=theory).pressure for x in (u - step, u + step)]  # fmt: skip
+    assert sticky.stiffness == pytest.approx((slope[0] - slope[1]) / (2 * step), rel=1e-3)
+
+
+def test_pressures_are_found_on_the_closest_contact():
+    loads = np.array([[0.02, 1e-3], [1e-5, 0.0]])
+    found = pressed(STICKY, pressure=loads)
+    again = pressed(STICKY, mean_separation=found.mean_separation)
+    assert again.pressure == pytest.approx(loads, rel=1e-9, abs=1e-14)
+    assert (found.stiffness > 0).all()
+    plain = pressed("1 GPa", pressure=loads[0])
+    assert (found.area[0] > plain.area).all()
+    assert (found.mean_separation[0] < plain.mean_separation).all()
+    by_area = pressed(STICKY, area=found.area[0])
+    assert by_area.pressure == pytest.approx(loads[0], rel=1e-6)
+
+
+def test_pull_off_is_the_largest_tension_of_any_gap():
+    free = pressed(STICKY, pressure=0.0)
+    gaps = np.linspace(0.2, 0.5, 30001)
+    tension = -pressed(STICKY, mean_separation=gaps).pressure
+    assert float(free.pull_off) == pytest.approx(tension.max(), rel=2e-3)
+    assert float(free.pull_off) >= tension.max()
+    assert float(free.zero_load_gap) == pytest.approx(float(free.mean_separation))
+    assert float(free.zero_load_area) == pytest.approx(float(free.area))
+    beyond = gaps > float(free.mean_separation)
+    work = np.trapezoid(tension[beyond], gaps[beyond])
+    assert float(free.effective_work) == pytest.approx(work, rel=0.02)
+    pulled = pressed(STICKY, pressure=-0.9 * float(free.pull_off))
+    assert pulled.pressure == pytest.approx(-0.9 * float(free.pull_off), rel=1e-6)
+    with pytest.raises(OutOfRangeError, match="part"):
+        pressed(STICKY, pressure=-1.01 * float(free.pull_off))
+
+
+def test_units_do_not_matter():
+    one = pressed(STICKY, pressure="1 MPa")
+    in_nm = contact(FACE.to("nm"), Bodies("1000 MPa", adhesion=Adhesion("0.01 N/m", "0.01 um")), pressure="1 MPa", theory="calibrated")  # fmt: skip
+    assert in_nm.area == pytest.approx(one.area, rel=1e-9)
+    assert in_nm.effective_work == pytest.approx(1e6 * one.effective_work, rel=1e-6)
+    numbers = contact(FACE, Bodies(1.0, adhesion=Adhesion(1e-5, 0.01)), pressure=1e-3, theory="calibrated")  # fmt: skip
+    assert numbers.area == pytest.approx(one.area, rel=1e-9)
+
+
+def test_tractions_have_the_work_that_is_given():
+    for traction in ("exponential", "van der Waals", lambda x: np.exp(-(x**2))):
+        shape = Adhesion(1.0, 1.0, traction=traction).shape
+        assert quad(lambda x, s=shape: float(s(np.array([x]))[0]), 0, np.inf)[
+            0
+        ] == pytest.approx(1.0, rel=1e-4)
+    own = Bodies("1 GPa", adhesion=Adhesion(WORK, RANGE, traction=lambda x: 3 * np.exp(-x)))  # fmt: skip
+    assert pressed(own, pressure="1 MPa").area == pytest.approx(
+        pressed(STICKY, pressure="1 MPa").area, rel=1e-4
+    )
+    # half-spaces at the cutoff attract each other with A/(6 pi D^3)
+    waals = Adhesion.of_hamaker("1e-19 J", "0.2 nm")
+    metres = Units(length="m", stress="Pa")
+    strength = waals.work_in(metres) / 0.2e-9 * float(waals.shape(np.zeros(1))[0])
+    assert strength == pytest.approx(1e-19 / (6 * np.pi * 0.2e-9**3), rel=1e-3)
+    assert not pressed(Bodies("100 GPa", adhesion=waals), pressure="1 MPa").valid
+
+
+def test_laws_joints_and_leakage_go_by_the_same_contact():
+    one = pressed(STICKY, pressure="2 MPa")
+    law = contact_law(FACE, STICKY, "calibrated")
+    at = law.at_pressure("2 MPa")
+    assert at.area == pytest.approx(one.area, rel=1e-5)
+    assert at.mean_separation == pytest.approx(one.mean_separation, rel=1e-6)
+    joint = Joint(FACE, bodies=STICKY, theory="calibrated")
+    assert joint.at(pressure="2 MPa").area == pytest.approx(one.area, rel=1e-5)
+    with pytest.raises(InputError, match="adhesion"):
+        joint.export("c-law")
+    elastic = pressed("1 GPa", mean_separation=one.mean_separation)
+    assert pytest.approx(elastic.leakage.K, rel=1e-9) == one.leakage.K
+
+
+def test_what_is_refused():
+    for wrong in (np.nan, np.inf, -1e-3, "5 J", "-5 mJ/m^2", [1.0, 2.0]):
+        with pytest.raises((InputError, OutOfRangeError)):
+            Adhesion(wrong, RANGE)
+    for wrong in (0.0, np.nan, np.inf, "5 J", -1.0):
+        with pytest.raises((InputError, OutOfRangeError)):
+            Adhesion(WORK, wrong)
+    for wrong in ("springs", 3, lambda x: x, lambda x: 1 / (1 + x)):
+        with pytest.raises(InputError):
+            Adhesion(WORK, RANGE, traction=wrong)
+    with pytest.raises(InputError, match="hardness"):
+        pressed(
+            Bodies("1 GPa", hardness="20 MPa", adhesion=Adhesion(WORK, RANGE)),
+            pressure="1 MPa",
+        )
+    with pytest.raises(InputError, match="unit"):
+        contact(Surface(0.8, 0.1, 1.6, 0.1, 0.35), STICKY, pressure="1 MPa")
+    with pytest.raises(InputError, match="adhesion"):
+        Bodies("1 GPa", adhesion="strong")
+    with pytest.raises(MissingError, match="adhesion"):
+        _ = pressed("1 GPa", pressure="1 MPa").pull_off
+    with pytest.raises(MissingError, match="energy"):
+        _ = pressed(STICKY, pressure="1 MPa").energy
+    with pytest.raises(OutOfRangeError):
+        pressed("1 GPa", pressure="-1 MPa")
+
+
+def test_valid_ends_with_its_reasons():
+    light = pressed(STICKY, pressure="1 MPa")
+    assert light.valid
+    assert float(light.tabor_number) < MOST_TABOR
+    hot = Bodies("1 GPa", adhesion=Adhesion("100 mJ/m^2", RANGE))
+    strong = pressed(hot, pressure="1 MPa")
+    assert not strong.valid
+    assert any("Tabor" in reason for reason in strong.reasons)
+    short = Bodies("1000 GPa", adhesion=Adhesion("1 mJ/m^2", "0.5 nm"))
+    assert any("range" in reason for reason in pressed(short, pressure="1 GPa").reasons)
+
+
+def held_out():
+    """The contacts of docs/adhesion.md by Tamaas, soft ones that its solver finished."""
+    rows = pd.read_csv(files.ROOT / "docs/data/adhesive_held_out.csv", comment="#")
+    tabor = np.cbrt(2 * rows.w**2 / (rows.laplacian_rms * rows.rho**3))
+    soft = (tabor < MOST_TABOR) & (rows.residual < 1e-3) & (rows.gap_over_h_rms > 0.003)
+    return rows[soft]
+
+
+def test_held_out_simulations_from_numbers_alone():
+    """How the attraction changes area and gap, of five surfaces known by their spectra alone.
+
+    Areas of those simulations are shares of points; their ratio to the elastic share is
+    free of what that adds.
+    """
+    rows = held_out()
+    growth, gap = [], []
+    for row in rows.itertuples():
+        q0, q1 = 2 * np.pi * row.nl, 2 * np.pi * 256 / row.points
+        face = Surface(row.hurst, q0, q1, row.h_rms, 4 * row.h_rms)
+        own = functools.partial(contact, face, theory="calibrated")
+        bodies = Bodies(1.0, adhesion=Adhesion(row.w, row.rho))
+        try:
+            sticky = own(bodies, pressure=row.net_pressure)
+        except OutOfRangeError:
+            # the attraction closes all gaps
+            assert row.gap_over_h_rms < 0.02
+            continue
+        plain = own(pressure=row.net_pressure)
+        simulated = row.compressed_area / row.elastic_area
+        growth.append(np.log(sticky.area / plain.area / simulated))
+        gap.append(np.log(sticky.mean_separation / row.h_rms / row.gap_over_h_rms))
+    assert len(growth) > 80
+    assert np.median(np.abs(growth)) < 0.015
+    assert np.quantile(np.abs(growth), 0.9) < 0.05
+    assert np.median(np.abs(gap)) < 0.06
