@@ -40,7 +40,7 @@ RANGES = (0.03, 0.1, 0.3, 1.0)  # over h_rms
 TABOR = (0.1, 0.2, 0.35, 0.5)
 AREAS = (0.002, 0.006, 0.02, 0.06, 0.15, 0.3, 0.55, 0.8)  # of elastic loads, about
 TOLERANCE = 1e-6
-LOADING = 0.02  # steps of pull-off, relative
+GRADIENT = 0.1  # rms, of surfaces that theories are asked about
 COLUMNS = (
     *("hurst", "zeta_1", "waves", "seed", "fitted", "range", "tabor", "work"),
     *("contact_pressure", "net_pressure", "area", "area_raw", "area_compressed"),
@@ -118,13 +118,14 @@ _FACES: dict[Any, Any] = {}
 
 
 def face_of(row: Any, name: str) -> Any:
-    """The map for "simulated", the numbers of the surface for other theories; rms gradient one."""
+    """The map for "simulated", the numbers of the surface for other theories."""
     key = (row.seed, name)
     if key not in _FACES:
         recipe = Recipe(
             "self_affine", row.hurst, row.zeta_1, int(row.waves), int(row.seed), POINTS
         )
         surface, _, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
+        surface = GRADIENT * surface
         if name == "simulated":
             _FACES[key] = Surface.from_map(surface, dx=1 / POINTS, periodic=True)
         else:
@@ -138,10 +139,11 @@ def face_of(row: Any, name: str) -> Any:
 def _answer(row: Any, name: str) -> list[Any]:
     face = face_of(row, name)
     h_rms = float(face.h_rms)
-    attraction = Adhesion(row.work * h_rms, row.range * h_rms)
+    attraction = Adhesion(row.work * h_rms * GRADIENT, row.range * h_rms)
+    pressure = row.net_pressure * GRADIENT
     try:
         pressed = contact(
-            face, Bodies(1.0, adhesion=attraction), pressure=row.net_pressure, theory=name
+            face, Bodies(1.0, adhesion=attraction), pressure=pressure, theory=name
         )
     except MbmaError:
         return [np.nan] * 4 + [False]
@@ -184,20 +186,25 @@ def adhesion(data: pathlib.Path, compare: bool) -> None:
                 opened.flush()
 
 
+def under_compression(rows: pd.DataFrame) -> pd.Series:
+    """Area under compression, corrected for the edges of contact as the contact area is."""
+    return rows.area - (rows.area_raw - rows.area_compressed)
+
+
 def _compare(rows: pd.DataFrame) -> None:
-    pressed = rows[rows.net_pressure > 0]
-    for name, share in itertools.product(
-        ("simulated", "calibrated"), (0.0, 0.25, 0.5, theory.THETA)
-    ):
-        found = answered(pressed, name, share)
-        error_of_area = np.log(found.area / pressed.area)
-        error_of_gap = np.log(found.gap / pressed.mean_separation)
+    pressed = rows[(rows.net_pressure > 0) & (rows.mean_separation > 0.01)]
+    for name in ("calibrated", "simulated"):
+        found = answered(pressed, name, theory.THETA)
+        of_area = np.log(found.area / under_compression(pressed)).abs()
+        of_gap = (found.gap - pressed.mean_separation).abs()
+        relative = np.log(found.gap / pressed.mean_separation).abs()
         for fitted, number in itertools.product((1, 0), TABOR):
-            chosen = (pressed.tabor == number) & (pressed.fitted == fitted)
-            chosen &= pressed.mean_separation > 0.01
-            area, gap = error_of_area[chosen].abs(), error_of_gap[chosen].abs()
+            chosen = (pressed.tabor == number) & (pressed.fitted == fitted) & found.valid
+            area, gap = of_area[chosen], relative[chosen]
+            within = area < 2 * found.area_scatter[chosen]
+            gap_within = of_gap[chosen] < 2 * found.gap_scatter[chosen]
             click.echo(
-                f"{name} theta {share:g} fitted {fitted} tabor {number:g}: "
-                f"{chosen.sum()} contacts, area {area.median():.3f} {area.quantile(0.9):.3f}, "
-                f"gap {gap.median():.3f} {gap.quantile(0.9):.3f}"
+                f"{name}, fitted {fitted}, Tabor {number:g}: {chosen.sum()} valid; "
+                f"area {area.median():.3f} {area.quantile(0.9):.3f}, {within.mean():.0%} within two; "
+                f"gap {gap.median():.3f} {gap.quantile(0.9):.3f}, {gap_within.mean():.0%}"
             )

@@ -108,7 +108,8 @@ class Bodies:
     adhesion: Any = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "adhesion", adhesion_of(self.adhesion))
+        if self.adhesion is not None:
+            object.__setattr__(self, "adhesion", adhesion_of(self.adhesion))
         for name, value in vars(self).items():
             if type(value) not in UNCHANGING:
                 object.__setattr__(self, name, detached(value))

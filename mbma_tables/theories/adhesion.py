@@ -31,9 +31,12 @@ from mbma_tables.theories.inversion import Indices
 THETA = 0.25
 # Tabor's number and range over h_rms up to which, and from which on, simulations agree
 MOST_TABOR = 0.4
+# and traction at gap zero over E* times the rms gradient, likewise
+MOST_STRENGTH = 0.05
 LEAST_RANGE = gap_law.RANGES[0]
 # standard deviation of ln A and of the gap over h_rms that the attraction adds, there
 AREA_ERROR = 0.02
+MODEL_ERROR = 0.25  # of ln of the attraction: what it deforms beside contacts
 MAP_ERROR = (
     0.03  # of the gaps of a simulated map, on 8 points to the shortest wave and more
 )
@@ -360,7 +363,8 @@ class Adhesive(Theory):
         pull = self.pull(surface, u, area)
         with np.errstate(divide="ignore", invalid="ignore"):
             net = answer.pressure[0] - pull
-            of_gaps = pull * self._scatter_of_gaps(surface, area) / answer.pressure[0]
+            of_pull = np.hypot(self._scatter_of_gaps(surface, area), MODEL_ERROR)
+            of_gaps = pull * of_pull / answer.pressure[0]
             if quantity == "pressure":
                 whole = np.hypot(elastic, of_gaps) * answer.pressure[0]
                 return np.asarray(whole / np.abs(net))
@@ -396,10 +400,13 @@ class Adhesive(Theory):
         stiff = np.broadcast_to(self.tabor(surface) > MOST_TABOR, shape)
         over = self.adhesion.width / np.asarray(surface.h_rms)
         short = np.broadcast_to(over < LEAST_RANGE, shape)
+        pull = self.adhesion.strength / self.modulus / np.asarray(surface.rms_gradient)
+        strong = np.broadcast_to(pull > MOST_STRENGTH, shape)
         other = np.full(shape, not self.adhesion.is_exponential)
         reasons = {
             f"adhesion: Tabor's number of a summit is above {MOST_TABOR:g}, where {SIMULATE}": stiff,
             f"adhesion: the range is below {LEAST_RANGE:g} h_rms, the shortest of gaps that were simulated": short,
+            f"adhesion: the traction is above {MOST_STRENGTH:g} E* times the rms gradient, where {SIMULATE}": strong,
             "adhesion: only an exponential traction was simulated": other,
             "adhesion: the contact is beyond pull-off, where it is stable at a given gap alone": (
                 answer.stiffness < 0

@@ -8,10 +8,14 @@ import pytest
 from scipy.integrate import quad
 
 from generate import files
+from generate.boundary_elements.solve import load_at, prepared
+from generate.boundary_elements.surfaces import Recipe, heights
 from mbma_tables import Adhesion, Bodies, Joint, Surface, contact, contact_law
 from mbma_tables.common.errors import InputError, MissingError, OutOfRangeError
 from mbma_tables.common.units import Units
+from mbma_tables.contacts.sticking import sticking
 from mbma_tables.theories.adhesion import MOST_TABOR, THETA
+from mbma_tables.theories.simulated.adhesive import AdhesiveContact
 
 FACE = Surface(hurst=0.8, q0=0.1, q1=1.6, h_rms=0.1, h_max=0.35, unit="um")
 WORK, RANGE = "10 mJ/m^2", "10 nm"
@@ -189,3 +193,78 @@ def test_held_out_simulations_from_numbers_alone():
     assert np.median(np.abs(growth)) < 0.015
     assert np.quantile(np.abs(growth), 0.9) < 0.05
     assert np.median(np.abs(gap)) < 0.06
+
+
+def test_whether_it_sticks_beside_published_criteria():
+    """Numbers of criteria by hand, from powers of the spectrum's wavenumbers."""
+    hurst, q, zeta, h = 0.8, 2.0, 4.0, 0.01
+    face = Surface(hurst, q0=q, q1=zeta * q, h_rms=h, h_max=0.035, unit="um")
+
+    def mean_power(n):
+        """Mean of q^n weighted by height variance."""
+        powers = [(zeta ** (k - 2 * hurst) - 1) / (k - 2 * hurst) for k in (n, 0)]
+        return q**n * powers[0] / powers[1]
+
+    bodies = Bodies("1 GPa", adhesion=Adhesion("1 mJ/m^2", "10 nm"))
+    found = sticking(face, bodies, theory="calibrated")
+    length, width = 1e-6, 0.01  # work over E*, range [um]
+    robbins, persson, fuller = found.criteria
+    # energy of full contact: q h^2/4 of each wave, over w/E*
+    full = mean_power(1) * h**2 / 4
+    assert persson.number == pytest.approx(full / length, rel=1e-4)
+    gradient, laplacian = h * mean_power(2) ** 0.5, h * mean_power(4) ** 0.5
+    spots = gradient * width / (2 * length)
+    spots *= (gradient * 8 * gradient / laplacian / (4 * width)) ** (2 / 3)
+    assert robbins.number == pytest.approx(spots, rel=1e-4)
+    radius, height = float(face.summit_radius), float(face.summit_sigma)
+    elongation = 0.75 * (np.pi**2 * length**2 * radius) ** (1 / 3)
+    assert fuller.number == pytest.approx(height / elongation, rel=1e-6)
+    free = contact(face, bodies, pressure=0.0, theory="calibrated")
+    assert found.pull_off == pytest.approx(float(free.pull_off))
+    # more work sticks by more criteria
+    weak, strong = (
+        sticking(face, Bodies("1 GPa", adhesion=Adhesion(work, "10 nm")), "calibrated")
+        for work in ("0.1 mJ/m^2", "80 mJ/m^2")
+    )
+    assert sum(one.sticks for one in weak.criteria) == 0
+    assert sum(one.sticks for one in strong.criteria) > 0
+    assert strong.pull_off > weak.pull_off
+    assert "Persson, Tosatti" in str(strong)
+    with pytest.raises(InputError, match="adhesion"):
+        sticking(face, Bodies("1 GPa"))
+
+
+@pytest.mark.slow
+def test_the_solver_against_tamaas_on_the_same_grid():
+    tamaas = pytest.importorskip("tamaas")
+    surface, _, _ = prepared(
+        heights(Recipe("self_affine", 0.8, 8, 2, 21, 128)), (1.0, 1.0), 4 * np.pi
+    )
+    surface = np.ascontiguousarray(0.1 * surface)
+    rho = 0.2 * surface.std()
+    work = 0.02 * 0.1 * rho
+    engine = AdhesiveContact(
+        surface, (1.0, 1.0), lambda gap: work / rho * np.exp(-gap / rho), 1e-7
+    )
+    own = engine.press(load_at(0.3, np.inf) * 0.1)
+    tamaas.set_log_level(tamaas.LogLevel.error)
+    model = tamaas.ModelFactory.createModel(
+        tamaas.model_type.basic_2d, [1.0, 1.0], list(surface.shape)
+    )
+    model.E, model.nu = 1.0, 0.0
+    solver = tamaas.PolonskyKeerRey(
+        model, surface, 1e-8, tamaas.PolonskyKeerRey.gap, tamaas.PolonskyKeerRey.pressure
+    )
+    solver.max_iter = 20_000
+    attraction = tamaas.ExponentialAdhesionFunctional(surface)
+    attraction.parameters = {"rho": rho, "surface_energy": work}
+    solver.addFunctionalTerm(attraction)
+    solver.solve(own["net_pressure"])
+    gap = np.asarray(model.displacement) - surface
+    gap -= gap.min()
+    assert gap.mean() == pytest.approx(own["mean_separation"], rel=1e-4)
+    traction = np.asarray(model.traction)
+    # where nothing touches its solver leaves rounding of either sign
+    pressed_points = (traction > 1e-5 * traction.max()).mean()
+    assert pressed_points == pytest.approx(own["area_compressed"], abs=1e-3)
+    assert traction.mean() == pytest.approx(own["net_pressure"], rel=1e-4)

@@ -378,11 +378,16 @@ def leakage_of(contact: Any) -> Leakage:
     return Leakage(K, x, y, xy, contact)
 
 
+def _never_yields(theory: Any) -> bool:
+    """Whether it is the theory of bodies without a hardness, with an attraction or not."""
+    return bool(np.isinf(getattr(theory, "hardness", np.inf)).all())
+
+
 def area_of_flow(
     theory: Any, surface: Any, u: FloatArray, area: FloatArray
 ) -> FloatArray:
     """A/A0 of the elastic contact that obstructs flow alike; `area` where nothing yields."""
-    if theory.elastic is theory:
+    if _never_yields(theory):
         return area
     yielded = np.nan_to_num(theory.loaded(surface, u).yielded)
     return shipped_flow().constants.elastic_area(area, yielded)
@@ -390,7 +395,7 @@ def area_of_flow(
 
 def yields_noticeably(theory: Any, surface: Any, u: FloatArray) -> Any:
     """Mask of contacts of which more than a negligible share yields; False of an elastic theory."""
-    if np.isinf(getattr(theory, "hardness", np.inf)).all():
+    if _never_yields(theory):
         return np.zeros(np.shape(u), bool)
     return np.asarray(theory.loaded(surface, u).yielded > NEGLIGIBLE_YIELD)
 
