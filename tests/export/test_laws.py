@@ -421,8 +421,8 @@ def test_rows_of_a_law_with_a_hardness():
 
 
 @pytest.mark.parametrize("quantity", ["leakage", "hydraulic_aperture"])
-def test_rows_of_a_yielded_seal_end_where_its_flow_is_not_known(quantity):
-    """The last row was 0.0, and the range "where contact blocks the gaps"."""
+def test_rows_of_a_yielded_seal_end_where_it_blocks(quantity):
+    """Yielded contact blocks the gaps at a larger share of the area than elastic contact does."""
     hard = Bodies(100e3, hardness=1500.0)
     law = describe_law(
         HARD, "100 GPa", stress_unit="MPa", hardness="1500 MPa", quantity=quantity,
@@ -431,13 +431,15 @@ def test_rows_of_a_yielded_seal_end_where_its_flow_is_not_known(quantity):
     elastic = describe_law(
         HARD, "100 GPa", stress_unit="MPa", quantity=quantity, theory="calibrated", rtol=1e-2,
     )  # fmt: skip
-    assert law.y.min() > 0
-    assert elastic.y[-1] == 0
-    end = float(law.x[-1])
-    made = contact_law(HARD, hard, "calibrated")
-    assert made.leakage(pressure=end * (1 - 1e-6)) > 0
-    assert np.isnan(made.leakage(pressure=end * 1.01))
+    assert law.y[-1] == elastic.y[-1] == 0
+    ends = {}
+    for name, rows, bodies in (("hard", law, hard), ("elastic", elastic, 100e3)):
+        made = contact_law(HARD, bodies, "calibrated")
+        end = float(rows.x[-1])
+        assert made.leakage(pressure=0.99 * end) > 0
+        assert made.leakage(pressure=1.001 * end) == 0
+        ends[name] = float(made.at_pressure(end).area)
+    assert 0.4 < ends["elastic"] < ends["hard"] < 0.6
     text = " ".join(law.comments)
-    assert "beyond, the flow of the yielded one is not known" in text
-    assert "K is not known from p = " in text
-    assert "K = 0 stands for" not in text
+    assert "where contact blocks the gaps" in text
+    assert "blocked, K = 0, from p = " in text
