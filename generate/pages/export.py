@@ -1,4 +1,4 @@
-"""The table of formats of rows in docs/export.md, from their declarations."""
+"""The tables of targets in docs/export.md, from their declarations."""
 
 from __future__ import annotations
 
@@ -9,13 +9,17 @@ from mbma_tables.export.targets import AGAINST, Target, targets
 
 
 def formats() -> Measured:
-    """Every format of rows that is declared: what it has, of which quantities, and how that was tested."""
+    """Every target that is declared: what it has, of rows of which quantities, and how that was tested."""
     rows = []
     for name, target in targets("SOLVERS", "DATA").items():
         cells = (_quantities(target), "; ".join(_limits(target)))
         rows.append((f"`{name}`", target.output, *cells, target.tested))
     header = "target | output | quantities | units, rows, name | tested with"
-    return {"formats": table(header, rows)}, {}
+    code = []
+    for name, target in targets("LAWS", "FMUS", "CODE").items():
+        code.append((f"`{name}`", target.output, target.tested))
+    of_code = table("target | output | tested with", code)
+    return {"code": of_code, "formats": table(header, rows)}, {}
 
 
 def _quantities(target: Target) -> str:

@@ -13,6 +13,7 @@ from generate.files import ROOT
 from generate.page import MARKED, fill, svg
 from generate.pages import export, library, maps, simulations, stability
 from mbma_tables import InputError, Surface, contact, theories
+from mbma_tables.export.targets import targets
 
 SVG = b"<?xml"
 # corners of parameters
@@ -172,10 +173,15 @@ def test_what_goes_wrong_is_counted():
     assert stability.row("some", found) == ["some", 5, 1, 2, 0, 0.5, 1]
 
 
-def test_the_table_of_formats_is_that_of_their_declarations():
+def test_the_tables_of_targets_are_those_of_their_declarations():
     text = (ROOT / "docs/export.md").read_text(encoding="utf-8")
     parts, _ = export.formats()
     assert fill(text, parts) == text
+    listed = "\n".join(parts.values())
+    for name, target in targets().items():
+        assert f"| `{name}` | {target.output} | " in listed
+        assert target.output
+        assert target.tested
 
 
 @pytest.mark.slow

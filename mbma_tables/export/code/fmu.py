@@ -353,6 +353,34 @@ def _build_description(name: str) -> bytes:
 
 
 TARGETS = (
-    Target("fmu", fmu, CODE | {"binaries"}, rows=False),
-    Target("fmu3", functools.partial(fmu, fmi=3), CODE | {"binaries"}, rows=False),
+    Target(
+        "fmu",
+        fmu,
+        CODE | {"binaries"},
+        rows=False,
+        output=(
+            "an FMU of FMI 2.0, for model exchange and co-simulation: the C law, "
+            "compiled for this platform and as source, units, directional derivatives"
+        ),
+        tested=(
+            "FMPy 0.3.32: validated, run as exported, built by gcc 12.2 with warnings "
+            "as errors, simulated both ways at 10,000 gaps, four laws, an overclosure "
+            "outside the range refused; not in Simulink or a Modelica tool"
+        ),
+    ),
+    Target(
+        "fmu3",
+        functools.partial(fmu, fmi=3),
+        CODE | {"binaries"},
+        rows=False,
+        output=(
+            "the same of FMI 3.0; with `--binaries all` also for Linux, macOS and "
+            "Windows on ARM"
+        ),
+        tested=(
+            "FMPy 0.3.32: validated, run as exported, both ways, built by gcc 12.2 "
+            "with the headers of the standard and warnings as errors; binaries for ARM "
+            "are made, not run"
+        ),
+    ),
 )

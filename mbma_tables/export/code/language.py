@@ -99,6 +99,9 @@ class Language:
     usage: str  # lines of the header: of {name} and {interface}
     call: str  # of a function, with {name}, {what} and {x}
     program: Program
+    # for the documentation: what the file has, and how that was tested
+    output: str
+    tested: str
     evaluator: str = ""
     check: tuple[str, ...] = ()  # a command of its own tools that finds errors in {file}
     number: Callable[[float], str] = number

@@ -394,6 +394,8 @@ def _target(name: str, language: Language) -> Target:
         rows=False,
         alone=language.alone,
         beside=tuple(file.end for file in language.beside),
+        output=language.output,
+        tested=language.tested,
     )
 
 

@@ -30,8 +30,9 @@ def subroutine(
     parts: Mapping[str, str],
     conductance_alone: bool = False,
     friction: tuple[str, str] | None = None,
+    **texts: str,
 ) -> Language:
-    """The C of a law with a routine, whose template is languages/ROUTINE.c."""
+    """The C of a law with a routine, whose template is languages/ROUTINE.c; `texts` are those of the documentation."""
     return c_language(
         usage,
         of_solver="void xit_(void) {} /* of Abaqus */\n",
@@ -39,4 +40,5 @@ def subroutine(
         subroutine=routine,
         conductance_alone=conductance_alone,
         friction=friction,
+        **texts,
     )

@@ -38,6 +38,16 @@ LANGUAGES = {
             "to *SURFACE INTERACTION, without which Abaqus takes the symmetric part. Shear "
             "stresses are in the local directions as Abaqus hands them over, DROT is not used.",
         ),
+        output=(
+            "`UINTER` in C, in one file with the law: pressure, shear with Coulomb's "
+            "friction, tangent, energies, heat flux and its derivatives"
+        ),
+        tested=(
+            "called by a Fortran program with the argument list of the manual (2017), "
+            "warnings as errors, which iterates as Abaqus does: paths of stick and slip"
+            " in one and two directions against an integration of its own, tangents "
+            "against differences, Newton's method quadratic in slip; not in Abaqus"
+        ),
     ),
     "abaqus-vuinter": subroutine(
         "vuinter",
@@ -56,6 +66,14 @@ LANGUAGES = {
             "WITH FRICTION. Shear stresses are in the local directions as Abaqus hands them "
             "over, DROT is not used; SFD is what slip dissipates in the increment.",
         ),
+        output=(
+            "`VUINTER` in C for Abaqus/Explicit, likewise, for all nodes of a contact "
+            "pair: pressure, shear with friction, energies; without heat"
+        ),
+        tested=(
+            "called by a Fortran program with the argument list of the manual (2017): "
+            "paths of several nodes against an integration of its own; not in Abaqus"
+        ),
     ),
     "abaqus-gapcon": subroutine(
         "gapcon",
@@ -67,5 +85,13 @@ LANGUAGES = {
         ),
         parts={"solver": "Abaqus/Standard", **STOP},
         conductance_alone=True,
+        output=(
+            "`GAPCON` in C, likewise: conductance against the pressure in the solver, "
+            "and its derivative; beyond the range the last value"
+        ),
+        tested=(
+            "called by a Fortran program with the argument lists of the manuals of "
+            "Abaqus (6.5 to 2017); not in Abaqus"
+        ),
     ),
 }

@@ -9,5 +9,14 @@ LANGUAGES = {
         "the functions. The C of the library itself, and the law's own numbers. "
         f"{NAN}",
         beside=(Beside(".h", "law.h"),),
+        output=(
+            "C99 and C++11: C code of the library, and the numbers of the law as data, "
+            "in one file, and `NAME.h`, a header for C and C++"
+        ),
+        tested=(
+            "gcc and g++ 12.2, -O2 and -O3, warnings as errors: 10,000 gaps down to "
+            "1e-12 from first contact, six laws; with the compiler flags of the "
+            "library, results are bitwise identical to the library's"
+        ),
     )
 }

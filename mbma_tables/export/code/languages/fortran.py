@@ -82,5 +82,13 @@ LANGUAGES = {
         beside=(Beside("_c.c", target="c-law"),),
         alone=False,
         reserved=_reserved,
+        output=(
+            "a Fortran 2008 module of elemental functions, and `NAME_c.c` beside it, "
+            "the same C"
+        ),
+        tested=(
+            "gfortran 12.2, `-std=f2008 -fcheck=all`, warnings as errors: the same "
+            "gaps, three laws"
+        ),
     )
 }

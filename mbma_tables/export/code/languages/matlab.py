@@ -45,5 +45,7 @@ LANGUAGES = {
         number=functools.partial(number, infinity="Inf", missing="NaN"),
         array=matrix,
         reserved=_reserved,
+        output="a function that returns a structure of functions",
+        tested="Octave 7.3: the same; not in MATLAB",
     )
 }

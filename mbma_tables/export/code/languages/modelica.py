@@ -131,5 +131,12 @@ LANGUAGES = {
         reserved=_reserved,
         # tools solve for c themselves
         inverts=False,
+        output=(
+            "a package: pressure and energy with their derivatives, tangent, area, with"
+            " units; the inverse is computed by the Modelica tool"
+        ),
+        tested=(
+            "rumoca 0.10: compiled and simulated, within 1e-9 at 10,000 gaps of two laws"
+        ),
     )
 }
