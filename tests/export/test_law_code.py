@@ -743,8 +743,7 @@ def sheared(law, c, walk):
 
 
 @needs("gfortran", "gcc", "g++")
-@pytest.mark.parametrize("name", ["calibrated", "hardened"])
-@pytest.mark.parametrize("directions", [1, 2])
+@pytest.mark.parametrize(("name", "directions"), [("calibrated", 1), ("hardened", 2)])
 def test_uinter_sticks_and_slips_as_coulombs_law_says(name, directions, tmp_path):
     """A path of displacements: stress, tangent and energies are those of springs that slip, integrated by themselves."""
     rng = np.random.default_rng(63)
@@ -803,8 +802,7 @@ end subroutine
 
 
 @needs("gfortran", "gcc", "g++")
-@pytest.mark.parametrize("name", ["calibrated", "hardened"])
-@pytest.mark.parametrize("directions", [1, 2])
+@pytest.mark.parametrize(("name", "directions"), [("calibrated", 1), ("hardened", 2)])
 def test_vuinter_has_the_law_at_all_nodes(name, directions, tmp_path):
     rng = np.random.default_rng(64)
     law = points(name).law
