@@ -50,6 +50,7 @@ PAGES = {
     "explorer": "explorer:measure",
     # `yield` is a word of the language
     "yield": "pages.laws:yielding",
+    "unloading": "pages.unloading:measure",
 }
 Picture: TypeAlias = "bytes | Figure"  # the content of a file, or what it is drawn from
 Measured: TypeAlias = tuple[dict[str, str], dict[str, Picture]]  # blocks and files

@@ -209,7 +209,7 @@ def unloading(folder: pathlib.Path, collect: bool, fit: bool, out: pathlib.Path)
         campaigns.run(tasks, folder, 1, solved)
         return
     frame = gathered(folder)
-    write_file(out, gzip.compress(to_csv(HEAD, frame, "%.4g"), mtime=0))
+    write_file(out, gzip.compress(to_csv(HEAD, frame, "%.6g"), mtime=0))
     click.echo(f"{out}: {len(frame)} contacts")
 
 

@@ -53,7 +53,7 @@ def _ratios(data: pd.DataFrame) -> Iterator[dict[str, Any]]:
                 "gap": elastic.mean_separation,
             }.items()
         }
-        for _, peak in group[group.kind != "elastic"].groupby("peak"):
+        for number, peak in group[group.kind != "elastic"].groupby("peak"):
             loaded = peak[peak.kind == "loaded"].iloc[0]
             after = peak[peak.kind == "unloaded"].sort_values("p")
             if after.empty or loaded.p0 * key[3] > LARGEST_LOAD:
@@ -70,6 +70,7 @@ def _ratios(data: pd.DataFrame) -> Iterator[dict[str, Any]]:
                     "group": "_".join(map(str, key)),
                     "family": key[0],
                     "psi": key[3],
+                    "peak": number,
                     "waves": row.waves,
                     "points": row.points,
                     "seed": row.seed,

@@ -86,6 +86,7 @@ class _Export(click.Command):
 )
 @options.theory_option
 @options.hardness_option
+@options.largest_pressure_option
 @options.variant_option
 @click.option(
     "--table",
@@ -185,7 +186,7 @@ def _units_alone(surface: Mapping[str, Any], source: str) -> dict[str, Any]:
 def _refuse_of_surface(given: Mapping[str, Any], source: str) -> None:
     """Refuse options of a surface's bodies and theory beside a file that has them."""
     bodies = ("conductivity", "conductivity_unit", "kappa", "friction", "hardness")
-    names = (*bodies, "theory", "variant")
+    names = (*bodies, "largest_pressure", "theory", "variant")
     words = [_word(name) for name in names if name in given]
     if words:
         raise InputError(f"--{source} has its own: leave {' and '.join(words)} out")
@@ -226,6 +227,7 @@ def _subject_of_surface(
         theory=given.get("theory"),
         variant=given.get("variant", "reported"),
         hardness=given.get("hardness", math.inf),
+        largest_pressure=given.get("largest_pressure"),
         heat=None if numbers == (None, None) else given_heat(*numbers),
         kappa=given.get("kappa"),
         friction=given.get("friction"),

@@ -42,6 +42,7 @@ class Model(NamedTuple):
     rtol: float
     theory: Any = None  # a name or None, and after `of` an object
     hardness: float | str | None = None
+    largest_pressure: float | str | None = None
     grid: str | None = None  # of theory "simulated"
     options: Mapping[str, Any] = MappingProxyType({})  # others of the theory, by name
 
@@ -84,7 +85,10 @@ class Model(NamedTuple):
         if conductivities is not None and len(conductivities) == 1:
             conductivities = 2 * conductivities
         return Bodies(
-            specimen.modulus, hardness=self.hardness, conductivity=conductivities
+            specimen.modulus,
+            hardness=self.hardness,
+            largest_pressure=self.largest_pressure,
+            conductivity=conductivities,
         )
 
 
@@ -509,6 +513,12 @@ hardness_option = _option(
     else _parse_number(ctx, param, given),
     metavar="X[UNIT]",
 )  # fmt: skip
+largest_pressure_option = _option(
+    "largest_pressure",
+    "With a hardness: the largest pressure so far, below which contacts unload and reload.",
+    callback=_parse_number,
+    metavar="X[UNIT]",
+)
 theory_options = option_group(
     "model",
     lambda given: Model(options=given.pop("option"), **given_values(given)),
@@ -517,6 +527,7 @@ theory_options = option_group(
     grid_option,
     *_MODEL_OPTIONS,
     hardness_option,
+    largest_pressure_option,
 )
 
 output_options = option_group(

@@ -663,7 +663,8 @@ class Contact(State, Displayed):
         from mbma_tables.theories.simulated.own_map import map_of, sides
 
         pressure = np.asarray(self.pressure, float)
-        if pressure.ndim or np.ndim(self.E_star) or np.ndim(self.bodies.hardness):
+        largest = 0.0 if self.bodies.largest is None else self.bodies.largest
+        if any(map(np.ndim, (pressure, self.E_star, self.bodies.hardness, largest))):
             raise InputError(
                 "a map is of one contact: give one pressure, one modulus and one hardness"
             )
@@ -685,11 +686,17 @@ class Contact(State, Displayed):
             heights / scale, stretched, pressing.TOLERANCE, cap, is_mirrored
         )
         with progress("boundary elements"):
-            engine.press(force / gradient)
+            engine.press(max(force, float(largest) / modulus) / gradient)
+            residual = scale * engine.residual_heights()
+            if largest > pressure:
+                engine = engine.unloading()
+                engine.press(force / gradient)
         length = self.bodies.units.length or "1"
         units = {"pressure": self.units["pressure"], "gap": length, "heights": length}
+        units["residual_heights"] = length
         traction = modulus * gradient * engine.traction
-        return ContactMap(treated.steps, units, traction, scale * engine.gap, heights)
+        gap = scale * engine.gap
+        return ContactMap(treated.steps, units, traction, gap, heights, residual)
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -703,6 +710,9 @@ class ContactMap(Displayed):
     )
     gap: FloatArray = quantity("gap to the rigid plane; zero in contact [length]")
     heights: FloatArray = quantity("height above the mean [length]")
+    residual_heights: FloatArray = quantity(
+        "height above that mean after the largest pressure, where yielded points stay flat [length]"
+    )
     _dims = ("x", "y")
 
     contact = property(

@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.bodies.bodies import Bodies, BodiesInUnits, is_array, names_metals
+from mbma_tables.bodies.bodies import (
+    Bodies,
+    BodiesInUnits,
+    after,
+    is_array,
+    names_metals,
+)
 from mbma_tables.bodies.materials import Pair, tangential_ratio
 from mbma_tables.common.arguments import (
     FloatArray,
@@ -23,6 +29,7 @@ from mbma_tables.common.arguments import (
     is_labelled,
     one_number,
     positive_array,
+    require,
     require_name,
     spread,
 )
@@ -403,6 +410,7 @@ class Joint(JointQuantities, Displayed):
             "parts and nominal_area": self.surface.h_max,
             "E_star": in_units.E_star,
             "hardness": in_units.hardness,
+            "largest_pressure": in_units.largest,
             "conductivity": in_units.conductivity_if_known,
             "temperature": gas.temperature,
             "gas_pressure": gas.pascals,
@@ -549,8 +557,119 @@ class Joint(JointQuantities, Displayed):
         return force_over_area(force, self.nominal_area, self.surface.unit)
 
     def at_pressure(self, pressure: ArrayLike | str) -> Contact:
-        """The contact at pressures F/A0 ("10 MPa"; plain numbers in the unit of the modulus), as of `contact`: each in first loading."""
+        """The contact at pressures F/A0 ("10 MPa"; plain numbers in the unit of the modulus), as of `contact`.
+
+        Each of several pressures is reached by first loading, also where a smaller one follows
+        a larger one: `path` has pressures one after the other, and `after` a joint that was
+        loaded before.
+        """
         return self.at(pressure=pressure)
+
+    def after(self, largest_pressure: ArrayLike | str) -> Joint:
+        """The joint after a largest pressure: contacts below it unload and reload on what yielded.
+
+        Every method of it is about such contacts: its law, tables, plots, and exports, as
+        those of a joint about its preload.
+
+        Parameters
+        ----------
+        largest_pressure : array_like or str
+            F/A0; plain numbers in the unit of the modulus.
+
+        Raises
+        ------
+        InputError
+            For a joint whose bodies have a largest pressure.
+
+        Examples
+        --------
+        >>> from mbma_tables import Joint
+        >>> face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+        >>> joint = Joint(face, bodies="steel 1020", nominal_area="4 cm^2", theory="calibrated")
+        >>> preloaded = joint.after("50 MPa")
+        >>> first, later = joint.at_pressure("25 MPa"), preloaded.at_pressure("25 MPa")
+        >>> bool(later.stiffness > 1.5 * first.stiffness)
+        True
+        """
+        return dataclasses.replace(self, bodies=after(self.bodies, largest_pressure))
+
+    def path(self, pressures: ArrayLike | Sequence[str]) -> Contact:
+        """The contacts at pressures that follow one another, each after the largest before it.
+
+        Parameters
+        ----------
+        pressures : array_like or sequence of str
+            F/A0 in their order; plain numbers in the unit of the modulus.
+
+        Returns
+        -------
+        Contact
+            One entry a pressure. Its energy is what unloading from there gives back.
+
+        Raises
+        ------
+        InputError
+            For a batch of joints, and where pressures are no list of numbers.
+
+        Examples
+        --------
+        >>> from mbma_tables import Joint
+        >>> face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+        >>> joint = Joint(face, bodies="steel 1020", nominal_area="4 cm^2", theory="calibrated")
+        >>> pressed = joint.path(["25 MPa", "50 MPa", "25 MPa", "50 MPa", "60 MPa"])
+        >>> [f"{gap:.2f}" for gap in pressed.mean_separation]
+        ['1.35', '1.16', '1.20', '1.16', '1.11']
+        """
+        self.require_one("a path")
+        in_units = self._in_units
+        numbers = finite_array("pressures", in_units.units.number("pressure", pressures))
+        if numbers.ndim != 1:
+            raise InputError(
+                f"pressures are a list of numbers in their order, got shape {numbers.shape}"
+            )
+        before = 0.0 if in_units.largest is None else float(in_units.largest)
+        largest = np.maximum(np.maximum.accumulate(numbers), before)
+        return contact_of(
+            self.surface,
+            dataclasses.replace(in_units, largest=largest),
+            {"pressure": numbers},
+            self.theory,
+            self.interface,
+        )
+
+    def settling(self, pressure: ArrayLike | str, reference: ArrayLike | str) -> Any:
+        """Approach of the bodies that stays after a pressure [length]: what a bolt loses of its stretch.
+
+        It is the difference of the gaps of mean planes at a small pressure in first loading,
+        and at the same pressure after the larger one.
+
+        Parameters
+        ----------
+        pressure : array_like or str
+            The largest F/A0.
+        reference : array_like or str
+            The small one, at which the joint was before; they broadcast.
+
+        Raises
+        ------
+        OutOfRangeError
+            Where the reference is not below the pressure.
+
+        Examples
+        --------
+        >>> from mbma_tables import Joint
+        >>> face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+        >>> joint = Joint(face, bodies="steel 1020", nominal_area="4 cm^2", theory="calibrated")
+        >>> f"{joint.settling('50 MPa', '1 MPa'):.2f} um"
+        '0.93 um'
+        """
+        units = self._in_units.units
+        largest = finite_array("pressure", units.number("pressure", pressure))
+        least = finite_array("reference", units.number("pressure", reference))
+        largest, least = np.broadcast_arrays(largest, least)
+        require("reference", least, least < largest, "below the pressure")
+        first = self.at(pressure=least).plane_separation
+        return first - self.after(largest[()]).at(pressure=least).plane_separation
 
     def at(
         self,
@@ -560,7 +679,7 @@ class Joint(JointQuantities, Displayed):
         pressure: ArrayLike | str | None = None,
         area: ArrayLike | None = None,
     ) -> Contact:
-        """The contact at a gap, a pressure or an area, as of `contact`: each in first loading.
+        """The contact at a gap, a pressure or an area, as of `contact`: each in first loading, or `after` a largest pressure.
 
         They broadcast with the arrays of the joint, and every quantity has the broadcast
         shape.
@@ -890,6 +1009,7 @@ class Joint(JointQuantities, Displayed):
             E_star=self.bodies.E_star,
             theory=self.theory,
             hardness=np.inf if self.bodies.hardness is None else self.bodies.hardness,
+            largest_pressure=self.bodies.largest_pressure,
             heat=heat_of(self._in_units, self.surface),
             kappa=self._kappa,
             kappa_varies=self.direction is not None,
@@ -1008,6 +1128,10 @@ class Joint(JointQuantities, Displayed):
         if is_array(hardness):
             hardness = shown(in_units.hardness, str(in_units.units.stress))
         facts["hardness"] = "infinite" if hardness is None else str(hardness)
+        if in_units.largest is not None:
+            facts["largest_pressure"] = shown(
+                in_units.largest, str(in_units.units.stress)
+            )
         facts["theory"] = theory_text(self.surface, self.theory)
         facts["gas"] = Gas.of(self.gas).name
         facts["surface"] = repr(self.surface)

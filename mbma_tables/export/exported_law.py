@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbma_tables import __version__
-from mbma_tables.bodies.bodies import Bodies
+from mbma_tables.bodies.bodies import Bodies, after
 from mbma_tables.bodies.materials import ELASTIC_PSI
 from mbma_tables.common.arguments import FloatArray, Numbers, number_in
 from mbma_tables.common.errors import InputError
@@ -189,8 +189,24 @@ class ExportedLaw:
         """The theory itself at mean separations; of a body the contacts at approaches that are left to the largest."""
         if self.force is not None:
             return pressed(self.force.body, self.law.h_max + self.force.first - u)
-        bodies = Bodies(self.modulus, hardness=self.hardness)
-        return contact(self.surface, bodies, mean_separation=u, theory=self.theory)
+        return contact(self.surface, self.bodies, mean_separation=u, theory=self.theory)
+
+    @property
+    def _loading(self) -> str:
+        """On the way to the pressures of a law with a hardness."""
+        largest = self.bodies.largest_pressure
+        if largest is None:
+            return "loading only, not for unloading, which is stiffer"
+        return (
+            f"after a largest pressure of {number(largest)} {self.stress}, below which it is that of unloading "
+            "and reloading, whose overclosure is zero at first contact with what yielded"
+        )
+
+    @property
+    def bodies(self) -> Bodies:
+        """Modulus and hardness, and the largest pressure so far, in the units of the file."""
+        largest = None if self.force is not None else self.law.setup.bodies.largest
+        return Bodies(self.modulus, hardness=self.hardness, largest_pressure=largest)
 
     def of_gas(
         self, gas: GasInGaps | None, unit: str, end: float, included: bool
@@ -253,7 +269,7 @@ class ExportedLaw:
         if self.hardness < np.inf:
             plastic = (
                 f"hardness = {number(self.hardness)} {stress}, plasticity index {about(gradient / self.hardness, 3)}: "
-                "loading only, not for unloading, which is stiffer"
+                + self._loading
             )
         names = self.surface.parameters or OWN_NUMBERS
         numbers = ", ".join(
@@ -302,7 +318,8 @@ class ExportedLaw:
                     else f"below p = {high}"
                 )
                 yield f"not valid {f'{where} {unit}' if low or high else 'at any pressure of the range'}: {reason}"
-        if law.softening is not None:
+        # a law after a largest pressure is softer beyond it, where the contact yields
+        if law.softening is not None and np.isinf(law.largest_before):
             yield (
                 f"softening: stiffness falls with compression from c = {about(law.h_max - law.softening)}, "
                 f"p = {about(law.pressure(law.softening))} {unit} on, which no simulation shows"
@@ -397,6 +414,7 @@ def exported_law(
     made_by: tuple[str, ...] = (),
     direction: str | float | None = None,
     interface: Interface = NOTHING_BETWEEN,
+    largest_pressure: float | str | None = None,
 ) -> ExportedLaw:
     """The law of one surface in known units, of a modulus and a hardness or of `Bodies`; a batch of surfaces and missing units are refused."""
     if isinstance(surface, ForceLaw):
@@ -418,6 +436,8 @@ def exported_law(
         )
     one: AnySurface = in_unit(surface, length_unit)
     given = E_star if isinstance(E_star, Bodies) else Bodies(E_star, hardness=hardness)
+    if largest_pressure is not None:
+        given = after(given, largest_pressure)
     bodies = given.in_units(one, stress_unit)
     length, stress = _known(bodies.units.length, bodies.units.stress)
     if one.shape != ():

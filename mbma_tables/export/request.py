@@ -55,6 +55,7 @@ class Subject:
     theory: str | Theory | UserTheory | None = None
     variant: str = "reported"
     hardness: float | str = math.inf  # infinite where nothing yields
+    largest_pressure: float | str | None = None  # so far; None of first loading
     heat: Heat | None = None  # None where there is no conductivity
     # normal over tangential stiffness, or that at a contact area
     kappa: float | Callable[[Any], Any] | None = None
@@ -87,6 +88,7 @@ def subject_of_law(law: ContactLaw) -> Subject:
         stress_unit=law.units.stress,
         theory=setup.theory,
         hardness=math.inf if bodies.hardness is None else bodies.hardness,
+        largest_pressure=bodies.largest_pressure,
         heat=heat_of(setup.bodies, law.surface),
         kappa=functools.partial(ratio_on, law.surface, bodies, None),
         bodies=bodies,
@@ -171,6 +173,8 @@ def files_of(
         )
     named, line_of_name = program.place_of_name(options.name, out)
     shared = {"theory": subject.theory, "hardness": subject.hardness, **units, **given}
+    if subject.largest_pressure is not None:
+        shared["largest_pressure"] = subject.largest_pressure
     if subject.variant != "reported":
         shared["variant"] = subject.variant
     shared["made_by"] = (*line_of_name, *made_by)
@@ -189,6 +193,7 @@ def files_of(
         if subject.bodies is not None:
             # those of the contact itself
             del shared["hardness"]
+            shared.pop("largest_pressure", None)
             bodies = subject.bodies
             shared["interface"] = subject.interface
     _refuse(target, [key for key, value in of_rows.items() if value is not None])
@@ -444,6 +449,7 @@ def _rows(
     if quantity not in AGAINST and subject.bodies is not None:
         # of the contact itself
         del asked["hardness"]
+        asked.pop("largest_pressure", None)
         return describe_law(
             subject.surface,
             subject.bodies,
@@ -491,6 +497,12 @@ def _of_code(
     """Arguments of a law as code; comments name what is left out of a joint."""
     language = LANGUAGES.get(target)
     notes: list[str] = []
+    if subject.largest_pressure is not None:
+        notes.append(
+            "without tangential stiffness and conductance, which jump at the largest pressure: "
+            "rows have them"
+        )
+        return {"notes": tuple(notes)}
     arguments = _stiffness_before_slip(subject, notes)
     if language and language.friction and subject.friction is not None:
         if "kappa" in arguments or not subject.is_joint:

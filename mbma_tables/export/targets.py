@@ -17,7 +17,10 @@ from mbma_tables.export.law_table import Curve, LawTable
 from mbma_tables.export.text import checked_name, comment
 
 LAW = frozenset(
-    {"theory", "variant", "hardness", "conductivity", "conductivity_unit", "kappa"}
+    {
+        *("theory", "variant", "hardness", "largest_pressure"),
+        *("conductivity", "conductivity_unit", "kappa"),
+    }
 )
 ROWS = LAW | {"rows", "rtol", "pressures", "leakage", "quantity", "peklenik", "direction"}
 CODE = LAW | {"name", "leakage", "direction", "quantity"}

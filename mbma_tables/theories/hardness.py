@@ -54,7 +54,11 @@ def with_hardness(
     if theory.presses_anew:
         from mbma_tables.theories.simulated.yielded import Saturated
 
-        loading = Saturated(theory, hardness_over_E_star)
+        loading = saturated = Saturated(theory, hardness_over_E_star)
+        if largest_pressure is not None:
+            from mbma_tables.theories.simulated.yielded import Unloaded
+
+            return Unloaded(saturated, np.asarray(largest_pressure, float) / E_star)
     else:
         from mbma_tables.theories.yielding.theory import Yielding
 

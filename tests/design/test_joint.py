@@ -23,6 +23,7 @@ from mbma_tables import (
     Gas,
     InputError,
     Joint,
+    OutOfRangeError,
     Surface,
     contact,
     contact_law,
@@ -1013,3 +1014,69 @@ def test_a_batch_in_a_file_is_told_of_by_the_command(tmp_path):
     refused = CliRunner().invoke(main, ["joint", str(path), "-p", "1MPa"])
     assert refused.exit_code != 0
     assert "a table is of one joint, and this is a batch of shape (2,)" in refused.output
+
+
+def test_a_path_has_each_pressure_after_the_largest_before_it():
+    face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+    joint = Joint(
+        face,
+        bodies="steel 1020",
+        nominal_area="4 cm^2",
+        theory="calibrated",
+        friction=0.2,
+    )
+    pressed = joint.path(["1 MPa", "50 MPa", "25 MPa", "60 MPa"])
+    names = (
+        "mean_separation",
+        "area",
+        "unloading_stiffness",
+        "total_conductance",
+        "energy",
+    )
+    for place, (pressure, largest) in enumerate(
+        [("1 MPa", "1 MPa"), ("50 MPa", "50 MPa"), ("25 MPa", "50 MPa"), ("60 MPa",) * 2]
+    ):
+        alone = joint.after(largest).at_pressure(pressure)
+        for name in names:
+            assert pressed.quantity(name)[place] == pytest.approx(
+                alone.quantity(name), rel=1e-9
+            )
+    first = joint.at_pressure("25 MPa")
+    assert pressed.stiffness[2] > 1.5 * first.stiffness
+    assert pressed.tangential().stiffness[2] == pytest.approx(
+        joint.after("50 MPa").at_pressure("25 MPa").tangential_stiffness, rel=1e-9
+    )
+    # a cycle of shear below the largest pressure dissipates less than one of first loading
+    loops = [one.tangential().energy_loss("2 MPa") for one in (pressed, first)]
+    assert 0 < loops[0][2] < loops[1]
+    with pytest.raises(InputError, match="a list of numbers in their order"):
+        joint.path("50 MPa")
+    # what stays is what loading closes beyond what unloading opens
+    settled = joint.settling(["10 MPa", "50 MPa"], "1 MPa")
+    after = joint.after("50 MPa").at_pressure("1 MPa").plane_separation
+    at_first = joint.at_pressure("1 MPa").plane_separation
+    assert settled[1] == pytest.approx(at_first - after, rel=1e-12)
+    assert 0 < settled[0] < settled[1] < float(joint.surface.h_max)
+    with pytest.raises(OutOfRangeError, match="reference must be below the pressure"):
+        joint.settling("1 MPa", "1 MPa")
+
+
+def test_exports_about_a_preload_are_of_unloading():
+    face = {"Rq": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+    bodies = dataclasses.replace(Bodies(metals="steel 1020"))
+    joint = Joint(face, bodies=bodies, nominal_area="4 cm^2", theory="calibrated").after(
+        "50 MPa"
+    )
+    pressed = joint.at_pressure(["10 MPa", "30 MPa"])
+    for quantity in ("solid_conductance", "unloading_stiffness"):
+        rows = json.loads(joint.export("json", ("1 MPa", "100 MPa"), quantity=quantity))
+        own = rows["columns"]
+        found = np.interp([10, 30], own["pressure"], own[quantity])
+        scale = found / pressed.quantity(quantity)
+        assert scale[0] == pytest.approx(scale[1], rel=2e-3)
+    assert "after a largest pressure of 50.0 MPa" in joint.export(
+        "calculix", ("1 MPa", "100 MPa"), heat=False
+    )
+    code = joint.export("c-law")
+    assert "jump at the largest pressure" in code
+    assert "solid_conductance" not in code.replace("without", "")

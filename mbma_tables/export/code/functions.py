@@ -2,6 +2,7 @@
 
 import math
 
+from mbma_tables.common.errors import InputError
 from mbma_tables.contacts.law.law import ContactLaw
 from mbma_tables.contacts.quantities import registry
 from mbma_tables.export.code.curves import Curve, Quantity, curve_of_flow, curve_of_gas
@@ -25,6 +26,11 @@ class Functions:
 
     def add_ratio(self, name: str, ratio: float, unit: str) -> None:
         """A quantity that is a ratio times the stiffness of a small unloading."""
+        if math.isfinite(self.exported.law.largest_before):
+            raise InputError(
+                f"{name} as a function of the gap jumps at the largest pressure: leave it "
+                "out, or write rows"
+            )
         sloped, factor = self.exported.law.unloading()
         self._add_slope(name, factor * ratio, unit, sloped)
 

@@ -78,6 +78,7 @@ def describe_law(
     evenly: bool = False,
     theory: str | Theory | UserTheory | None = None,
     hardness: float | str = np.inf,
+    largest_pressure: float | str | None = None,
     peklenik: float | None = None,
     made_by: tuple[str, ...] = (),
     direction: str | float | None = None,
@@ -92,9 +93,10 @@ def describe_law(
     surface : Surface
         One surface; or the force law of a rough sphere or cylinder (`RoughContact.law`)
         alone, of pressure as force.
-    E_star, variant, theory, hardness
-        As for `contact`; with a hardness the law of loading, and conductance by the
-        stiffness of the frozen contact. `Bodies` in place of a modulus have the hardness.
+    E_star, variant, theory, hardness, largest_pressure
+        As for `contact`; with a hardness the law of loading, below a largest pressure that of
+        unloading and reloading, and conductance by the stiffness of the frozen contact.
+        `Bodies` in place of a modulus have both.
     length_unit, stress_unit : str, optional
         Units of the rows. A surface or modulus that has another one is converted; one that
         has none is in these.
@@ -201,6 +203,7 @@ def describe_law(
         made_by,
         direction,
         interface,
+        largest_pressure,
     )
     least, end = _range(exported, pressures)
     if film:
@@ -587,7 +590,7 @@ def _film_rows(
     at = functools.partial(
         flow_factors,
         exported.surface,
-        bodies=Bodies(exported.modulus, hardness=exported.hardness),
+        bodies=exported.bodies,
         peklenik=peklenik,
         theory=exported.theory,
     )

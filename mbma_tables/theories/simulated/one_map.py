@@ -96,6 +96,7 @@ class BoundaryElements(Theory):
         pressed: Press | MapSimulation,
         origin: str,
         grid: Grid = FULL,
+        top: float | None = None,
     ) -> None:
         self.grid = grid
         # a table without its map is not pressed anew
@@ -107,7 +108,8 @@ class BoundaryElements(Theory):
             pressed,
             origin,
         )
-        top = float(surface.h_max)
+        # the highest point, of the surface unless it is another after a load
+        top = float(surface.h_max) if top is None else top
         steps = np.diff(rows)
         if not (
             (rows > 0).all()
@@ -450,7 +452,16 @@ class BoundaryElements(Theory):
             np.broadcast_shapes(np.shape(mean_separation), surface.shape),
         )
         require("mean_separation", u, u >= 0, "at least 0")
-        return np.asarray(np.minimum(u, self.surface.h_max))
+        return np.asarray(np.minimum(u, self.fit.top))
+
+    def highest(self, surface: AnySurface) -> FloatArray:
+        """The highest point of the map, which after a load may be another."""
+        return np.asarray(self.fit.top)
+
+    def interval(
+        self, surface: AnySurface, quantity: str = "pressure"
+    ) -> tuple[FloatArray, FloatArray]:
+        return np.zeros(()), np.asarray(self.fit.top)
 
 
 @shared(8)

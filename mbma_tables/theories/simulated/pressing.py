@@ -148,6 +148,19 @@ class Press:
             )
         return self._found[load]
 
+    def residual(self, load: float) -> FloatArray:
+        """Heights of the map after a load over A0 E*, whose yielded points stay flat."""
+        name = f"{self.name(load)}-residual"
+        kept = cache.load(name, heights=self.heights.shape)
+        if kept is None:
+            own = self.heights / self.scale
+            engine = Contact(own, self._sizes, self._tolerance, self._cap, self.mirrored)
+            with shown("boundary elements"):
+                engine.press(load / self.gradient)
+            kept = {"heights": engine.residual_heights()}
+            cache.keep(name, **kept)
+        return np.asarray(kept["heights"] * self.scale)
+
     def loads(self, wanted: FloatArray, more: bool) -> tuple[FloatArray, FloatArray]:
         """Loads, and rows of `quantities` at them, rising.
 

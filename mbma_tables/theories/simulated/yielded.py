@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import collections
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,10 @@ from mbma_tables.theories.simulated.grids import AREAS
 from mbma_tables.theories.simulated.one_map import BoundaryElements
 from mbma_tables.theories.simulated.pressing import TOLERANCE, Press
 from mbma_tables.theories.yielding.theory import Yielding, elastic_scatter
+from mbma_tables.theories.yielding.unloading import Peak, Unloading
 
+# pressures over the largest at which a residual shape is pressed
+UNLOADED = (0.01, 0.03, 0.07, 0.13, 0.22, 0.35, 0.5, 0.65, 0.8, 0.91, 1.0)
 KEPT = 8  # hardnesses of maps whose simulations are kept
 # standard deviations of ln of a quantity, by `python -m generate machined`
 SCATTER = {"area": 0.010, "pressure": 0.011, "unloading_stiffness": 0.033}
@@ -127,6 +130,49 @@ class Plastic(BoundaryElements):
 plastic = shared(KEPT)(Plastic)
 
 
+class Released(BoundaryElements):
+    """The map as a load left it, p_m/E* = `cap`, pressed elastically up to that load over A0 E*."""
+
+    of_yielded_gaps = True
+
+    def __init__(self, theory: BoundaryElements, cap: float, largest: float) -> None:
+        known = theory.pressed
+        assert isinstance(known, Press)
+        shape = known.heights, known.sizes, known.gradient, TOLERANCE, known.mirrored
+        loaded = Press(*shape, cap, left_out=known.left_out)
+        self.residual_heights = loaded.residual(largest)
+        press = Press(self.residual_heights, *shape[1:], left_out=known.left_out)
+        force, rows = press.loads(largest * np.array(UNLOADED), False)
+        top = float(self.residual_heights.max() - self.residual_heights.mean())
+        rows = np.array([force, *rows])
+        more = theory.points, press, theory.origin, theory.grid, top
+        super().__init__(theory.surface, rows, *more)
+
+
+released = shared(KEPT)(Released)
+
+
+def by_entry(
+    keys: Sequence[FloatArray],
+    simulation: Callable[..., Any],
+    ask: Callable[..., Any],
+    given: Sequence[ArrayLike],
+) -> Any:
+    """What simulations answer at entries with their numbers, the keys; rows first."""
+    arrays = np.broadcast_arrays(*keys, *given)
+    own, values = arrays[: len(keys)], arrays[len(keys) :]
+    shape = own[0].shape
+    distinct = np.unique(np.stack([key.ravel() for key in own]), axis=1)
+    found: Any = None
+    for key in distinct.T.tolist():
+        mask = np.logical_and.reduce([a == b for a, b in zip(own, key, strict=True)])
+        part = np.asarray(ask(simulation(*key), *(value[mask] for value in values)))
+        if found is None:
+            found = np.empty((*part.shape[:-1], *shape))
+        found[..., mask] = part
+    return found
+
+
 class Saturated(Yielding):
     """A simulated map whose pressures cannot exceed a hardness; each takes one or two times the elastic time."""
 
@@ -134,19 +180,9 @@ class Saturated(Yielding):
 
     def _each(self, ask: Callable[..., Any], *given: ArrayLike) -> Any:
         """What simulations answer at entries with their hardnesses; rows first."""
-        caps, *values = np.broadcast_arrays(self.hardness, *given)
-        parts = {
-            cap: np.asarray(
-                ask(self._simulation(cap), *(value[caps == cap] for value in values))
-            )
-            for cap in np.unique(caps).tolist()
-        }
-        found = np.empty((*next(iter(parts.values())).shape[:-1], *caps.shape))
-        for cap, part in parts.items():
-            found[..., caps == cap] = part
-        return found
+        return by_entry([self.hardness], self._simulation, ask, given)
 
-    def _is_beyond_reach(self, cap: ArrayLike) -> Any:
+    def is_beyond_reach(self, cap: ArrayLike) -> Any:
         """Mask of hardnesses that no point reaches, were it to bear the heaviest load alone."""
         heaviest = self.elastic.rows[0, -1]
         pressed = self.elastic.pressed
@@ -156,7 +192,7 @@ class Saturated(Yielding):
     def _simulation(self, cap: float) -> Any:
         # the contact is the elastic one, whose stiffness is known better than by a simulation
         # of the frozen contact
-        beyond = self._is_beyond_reach(cap)
+        beyond = self.is_beyond_reach(cap)
         return self.elastic if beyond else plastic(self.elastic, cap)
 
     def loaded(
@@ -241,4 +277,102 @@ class Saturated(Yielding):
         measured = np.hypot(
             elastic, SCATTER.get(quantity, np.nan if quantity == "stiffness" else 0.0)
         )
-        return np.where(self._is_beyond_reach(self.hardness), elastic, measured)
+        return np.where(self.is_beyond_reach(self.hardness), elastic, measured)
+
+
+class Residuals(Theory):
+    """The elastic contacts of a map as largest loads over A0 E* left it, each a simulation of its own."""
+
+    def __init__(self, loading: Saturated, largest: FloatArray) -> None:
+        self.loading, self.largest = loading, largest
+        self.name, self.ends_at_h_max = loading.name, loading.ends_at_h_max
+
+    def _simulation(self, cap: float, largest: float) -> BoundaryElements:
+        loading = self.loading
+        if largest == 0 or loading.is_beyond_reach(cap):
+            return loading.elastic
+        simulation: BoundaryElements = released(loading.elastic, cap, largest)
+        return simulation
+
+    def _each(self, ask: Callable[..., Any], *given: ArrayLike) -> Any:
+        keys = [self.loading.hardness, self.largest]
+        return by_entry(keys, self._simulation, ask, given)
+
+    def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
+        return TheoryAnswer(
+            *self._each(lambda own, u: own.answer(surface, u), mean_separation)
+        )
+
+    def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
+        return np.asarray(
+            self._each(lambda own, u: own.energy(surface, u), mean_separation)
+        )
+
+    def highest(self, surface: AnySurface) -> FloatArray:
+        none = np.zeros(())
+        return np.asarray(
+            self._each(lambda own, _: none + own.highest(surface) + _, none)
+        )
+
+    def inverted(
+        self, surface: AnySurface, quantity: str, wanted: FloatArray
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
+        u = self._each(lambda own, x: own.inverted(surface, quantity, x)[0], wanted)
+        return u, np.zeros(u.shape, bool)
+
+    def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
+        """That of a simulated map, at contacts of its residual shape."""
+        return np.asarray(
+            self._each(lambda own, x: own.scatter(surface, quantity, x), area)
+        )
+
+
+class Unloaded(Unloading):
+    """A simulated map with a hardness after a largest pressure: its residual shape, pressed elastically."""
+
+    def __init__(self, loading: Saturated, largest: ArrayLike) -> None:
+        super().__init__(loading, largest)
+        self.branch_theory = Residuals(loading, self.largest)
+
+    def weights(self, yielded: FloatArray, area: FloatArray) -> tuple[Any, Any]:
+        """No spots beside those of the residual shape."""
+        none = 0.0 * yielded
+        return (none, 1 + none, 0.5 + none), (none, 1 + none, 0.5 + none)
+
+    def _peak(self, surface: AnySurface) -> Peak:
+        # frozen and slope of the curve differ by what interpolation leaves
+        peak = super()._peak(surface)
+        return peak._replace(stiffness=peak.elastic.stiffness)
+
+    def bends(self, surface: AnySurface) -> FloatArray:
+        peak, tail = self._curve(surface)
+        if np.size(peak.mean_separation) > 1 or not np.all(peak.remembered):
+            return self.loading.bends(surface)
+        return np.concatenate(
+            [np.reshape(each, 1) for each in (peak.mean_separation, tail.first)]
+        )
+
+    def _elastic_separation(self, surface: AnySurface, u: FloatArray) -> FloatArray:
+        # both curves differ by what interpolation between loads leaves at the largest pressure
+        peak, tail = self._curve(surface)
+        v = u - peak.mean_separation + peak.elastic_separation
+        return np.asarray(np.clip(v, peak.elastic_separation, tail.elastic_separation))
+
+    def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
+        peak = self.peak(surface)
+        on_branch = peak.remembered & (area < peak.area)
+        loading = self.loading.scatter(surface, quantity, np.asarray(area, dtype=float))
+        if not on_branch.any():
+            return loading
+        name = "stiffness" if quantity == "unloading_stiffness" else quantity
+        # areas of both branches differ by what edges of yielded points take
+        own_area = area * peak.elastic.area / peak.area
+        own = self.branch_theory.scatter(surface, name, own_area)
+        measured = SCATTER.get(
+            "unloading_stiffness" if name == "stiffness" else name, 0.0
+        )
+        return np.where(on_branch, np.hypot(own, measured), loading)
+
+    def gaps(self) -> Any:
+        """None: flow through gaps after a larger pressure was not compared."""
+        return None

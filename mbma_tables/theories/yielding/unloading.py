@@ -49,19 +49,19 @@ FRACTIONS = (0.01, 0.03, 0.1, 0.2, 0.3, 0.5, 0.75, 0.9, 1.0)
 SHARES = (0.2, 0.65, 0.97)
 SCATTER: dict[str, tuple[tuple[float, ...], ...]] = {
     "stiffness": (
-        (0.237, 0.181, 0.083, 0.052, 0.046, 0.054, 0.039, 0.021, 0.000),
-        (0.252, 0.221, 0.167, 0.104, 0.081, 0.067, 0.045, 0.021, 0.000),
-        (0.363, 0.308, 0.203, 0.148, 0.114, 0.063, 0.039, 0.014, 0.000),
+        (0.274, 0.201, 0.093, 0.054, 0.047, 0.053, 0.039, 0.020, 0.000),
+        (0.242, 0.215, 0.170, 0.109, 0.086, 0.066, 0.043, 0.020, 0.000),
+        (0.336, 0.274, 0.188, 0.139, 0.113, 0.063, 0.039, 0.013, 0.000),
     ),
     "area": (
-        (0.153, 0.143, 0.072, 0.042, 0.043, 0.051, 0.029, 0.016, 0.000),
-        (0.175, 0.121, 0.083, 0.073, 0.053, 0.041, 0.049, 0.024, 0.000),
-        (0.153, 0.120, 0.075, 0.059, 0.050, 0.032, 0.019, 0.014, 0.000),
+        (0.189, 0.161, 0.076, 0.044, 0.044, 0.051, 0.031, 0.016, 0.000),
+        (0.169, 0.125, 0.096, 0.079, 0.054, 0.041, 0.049, 0.025, 0.000),
+        (0.149, 0.115, 0.075, 0.058, 0.049, 0.034, 0.019, 0.014, 0.000),
     ),
     "lift": (
-        (0.060, 0.041, 0.030, 0.032, 0.034, 0.035, 0.035, 0.034, 0.034),
-        (0.071, 0.077, 0.058, 0.050, 0.046, 0.040, 0.029, 0.018, 0.018),
-        (0.137, 0.113, 0.080, 0.056, 0.044, 0.033, 0.017, 0.007, 0.007),
+        (0.073, 0.046, 0.031, 0.033, 0.035, 0.035, 0.034, 0.034, 0.034),
+        (0.070, 0.073, 0.061, 0.051, 0.046, 0.038, 0.028, 0.017, 0.017),
+        (0.123, 0.101, 0.076, 0.055, 0.044, 0.033, 0.017, 0.007, 0.007),
     ),
 }
 SOFTEST = (
@@ -118,8 +118,8 @@ class Spots(NamedTuple):
 AREA = 0.05
 AREAS = (0.003, 0.5)
 # fitted to boundary elements by `python -m generate unloading --fit`
-STIFFNESS = Spots(1.130, -0.381, -2.736, -0.157, 1.397, -2.641, 0.148)
-CONTACT = Spots(1.062, 0.320, -1.239, -0.002, 1.446, -2.575, -0.121)
+STIFFNESS = Spots(1.127, -0.354, -3.242, -0.159, 1.374, -2.662, 0.163)
+CONTACT = Spots(1.043, 0.328, -1.338, -0.024, 1.440, -2.508, -0.144)
 
 
 def flattened(s: FloatArray, power: Any, exponent: Any) -> FloatArray:
@@ -234,6 +234,8 @@ class Unloading(Theory):
         self.largest = np.asarray(largest, dtype=float)
         self.elastic, self.hardness = loading.elastic, loading.hardness
         self.name, self.ends_at_h_max = loading.name, loading.ends_at_h_max
+        # of the elastic contact that the branch is made from
+        self.branch_theory: Theory = loading.elastic
         self._bound: tuple[Any, Any, Any] = None, None, None
 
     def at(self, shape: tuple[int, ...], place: Any) -> Theory:
@@ -273,6 +275,10 @@ class Unloading(Theory):
             self._bound = surface, peak, self._tail(surface, peak)
         return self._bound[1], self._bound[2]
 
+    def weights(self, yielded: FloatArray, area: FloatArray) -> tuple[Any, Any]:
+        """w, a and b of the stiffness and of the area."""
+        return STIFFNESS.of(yielded, area), CONTACT.of(yielded, area)
+
     def _peak(self, surface: AnySurface) -> Peak:
         loading = self.loading
         over = self.largest > self.hardness
@@ -285,7 +291,7 @@ class Unloading(Theory):
         pressure = np.where(self._loaded_before, self.largest, small)
         u, lighter = loading.at_force(surface, pressure)
         loaded = loading.loaded(surface, u, lighter)
-        v = self.elastic.mean_separation_at(surface, "pressure", pressure)
+        v = self.branch_theory.mean_separation_at(surface, "pressure", pressure)
         yielded = np.where(self._loaded_before, loaded.yielded, 0.0)
         return Peak(
             pressure,
@@ -295,20 +301,19 @@ class Unloading(Theory):
             yielded,
             u - loaded.plane_separation,
             yielded > 0,
-            STIFFNESS.of(yielded, loaded.answer.area),
-            CONTACT.of(yielded, loaded.answer.area),
-            self.elastic.answer(surface, v),
+            *self.weights(yielded, loaded.answer.area),
+            self.branch_theory.answer(surface, v),
             v,
         )
 
     def _tail(self, surface: AnySurface, peak: Peak) -> Tail:
-        elastic = self.elastic
+        elastic = self.branch_theory
         pressure = LEAST * peak.pressure
         v = elastic.mean_separation_at(surface, "pressure", pressure)
         first = peak.separation(v, np.asarray(LEAST))
         last = first
         if self.ends_at_h_max:
-            end = np.asarray(surface.h_max, dtype=float)
+            end = elastic.highest(surface)
             last = peak.separation(end, np.asarray(0.0))
         branch = self._branch(surface, peak, v, first).answer
         power = np.where(last > first, branch.stiffness * (last - first) / pressure, 1.0)
@@ -340,10 +345,10 @@ class Unloading(Theory):
             return bends
         met = np.reshape(peak.mean_separation, 1)
         bends = bends[bends < met]
-        elastic = np.asarray(self.elastic.bends(surface))
+        elastic = np.asarray(self.branch_theory.bends(surface))
         elastic = elastic[elastic > peak.elastic_separation]
         if elastic.size:
-            s = self.elastic.answer(surface, elastic).pressure / peak.pressure
+            s = self.branch_theory.answer(surface, elastic).pressure / peak.pressure
             bends = np.concatenate([bends, peak.separation(elastic, s)])
         if self.ends_at_h_max:
             bends = np.concatenate([bends, np.reshape(tail.first, 1)])
@@ -387,7 +392,7 @@ class Unloading(Theory):
         self, surface: AnySurface, peak: Peak, v: FloatArray, u: FloatArray
     ) -> Unloaded:
         """Contacts of the branch, by mean separations v of the elastic contact at the same forces."""
-        elastic = self.elastic.answer(surface, v)
+        elastic = self.branch_theory.answer(surface, v)
         s = np.minimum(elastic.pressure / peak.pressure, 1.0)
         weight, *powers = peak.spots
         compliance = (1 - weight) * peak.elastic.stiffness / elastic.stiffness
@@ -438,7 +443,7 @@ class Unloading(Theory):
 
         def missed(v: FloatArray, place: FloatArray) -> FloatArray:
             chosen = place.astype(np.intp)
-            part = self.elastic.at(shape, chosen)
+            part = self.branch_theory.at(shape, chosen)
             own_peak = peak.at(shape, chosen)
             force = part.answer(select(surface, shape, chosen), v).pressure
             s = np.minimum(force / own_peak.pressure, 1.0)
@@ -448,8 +453,10 @@ class Unloading(Theory):
         inside = (wanted > peak.mean_separation) & (wanted < tail.first)
         bracket = low, np.where(inside, high, low)
         found = find_root(missed, bracket, args=(place,)).x
-        ends = np.where(wanted >= tail.first, high, low)
-        return np.where(inside, found, ends)
+        # without a bracket contacts are within rounding of an end
+        is_light = tail.first - wanted < wanted - peak.mean_separation
+        ends = np.where(is_light, high, low)
+        return np.where(inside & ~np.isnan(found), found, ends)
 
     def at_force(
         self, surface: AnySurface, pressure: FloatArray
@@ -457,7 +464,7 @@ class Unloading(Theory):
         """Mean separations u at forces over A0 E*, and those of the elastic contact."""
         peak = self.peak(surface)
         heavy = (pressure >= peak.pressure) | ~peak.remembered
-        v = self.elastic.mean_separation_at(surface, "pressure", pressure)
+        v = self.branch_theory.mean_separation_at(surface, "pressure", pressure)
         s = np.minimum(pressure / peak.pressure, 1.0)
         tail = self.tail(surface)
         with np.errstate(divide="ignore"):
@@ -525,7 +532,7 @@ class Unloading(Theory):
     ) -> FloatArray:
         """Standard deviation of ln of the pressure at a mean separation."""
         pressure = s * peak.pressure
-        v = self.elastic.mean_separation_at(surface, "pressure", pressure)
+        v = self.branch_theory.mean_separation_at(surface, "pressure", pressure)
         u = peak.separation(v, s)
         stiffness = self._branch(surface, peak, v, u).answer.stiffness
         at_peak = self.loading.scatter(surface, "pressure", peak.area)
@@ -574,12 +581,16 @@ class Unloading(Theory):
             "at least that under the largest pressure, above which the contact yields",
         )
         v = np.maximum(self._elastic_separation(surface, u), peak.elastic_separation)
-        s = np.minimum(self.elastic.answer(surface, v).pressure / peak.pressure, 1.0)
+        s = np.minimum(
+            self.branch_theory.answer(surface, v).pressure / peak.pressure, 1.0
+        )
         tail = self.tail(surface)
         s = np.where(u > tail.first, s * tail.left(u) ** tail.power, s)
         weight, *powers = peak.spots
         flat = weight * peak.pressure**2 * energy(s, *powers)
-        elastic = (1 - weight) * self.elastic.energy(surface, v) * peak.elastic.stiffness
+        elastic = (
+            (1 - weight) * self.branch_theory.energy(surface, v) * peak.elastic.stiffness
+        )
         found = np.asarray((elastic + flat) / peak.stiffness)
         if np.all(peak.remembered):
             return found

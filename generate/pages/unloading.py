@@ -1,0 +1,150 @@
+"""Measured tables and the figure of docs/unloading.md."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from generate.files import read_csv
+from generate.page import Cell, Measured, table
+from generate.unloading_fit import CLASSES, LIGHT, left_out, ratios, rms
+from mbma_tables import Bodies, Joint, Surface, contact
+from mbma_tables.common.plots import new_figure
+from mbma_tables.theories.yielding.unloading import ratio_scatter
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NAMES = ("stiffness", "area", "lift")
+FACES = {"Ra 0.4 um": 0.4, "Ra 0.8 um": 0.8, "Ra 1.6 um": 1.6}
+METAL = "steel 1020"
+LOADS = ("10 MPa", "50 MPa", "100 MPa")
+SHOWN = (2.5, 8.0)  # psi of the figure's points
+
+
+def measure() -> Measured:
+    rows = ratios(read_csv("unloading.csv.gz"))
+    tested = left_out(rows[rows.waves != 2])
+    parts = {
+        "accuracy": accuracy(tested),
+        "other": other(),
+        "grids": grids(rows),
+        "settling": settling(),
+    }
+    return parts, {"docs/figures/unloading.svg": draw(rows)}
+
+
+def accuracy(tested: pd.DataFrame) -> str:
+    """Deviations on groups left out, from a tenth of the largest pressure on."""
+    lines: list[list[Cell]] = []
+    above = tested[tested.s > LIGHT]
+    for label, (low, high) in CLASSES.items():
+        own = above[(above.psi > low) & (above.psi < high)]
+        line: list[Cell] = [label]
+        for name in NAMES:
+            missed = own[f"missed_{name}"]
+            stated = ratio_scatter(name, own.s.to_numpy(), own.yielded.to_numpy())
+            inside = [100 * np.mean(np.abs(missed) <= k * stated) for k in (1, 2)]
+            line.append((100 * rms(missed), *inside))
+        lines.append(line)
+    header = "surfaces | stiffness | area | lift"
+    return table(header, lines, "{} | {:.1f}%; {:.0f}%, {:.0f}%")
+
+
+def missed_of_others() -> pd.DataFrame:
+    """ln(law/simulation) of ratios by another program, by the calibrated law with h_max."""
+    data = read_csv("unloading_other.csv")
+    face = Surface(hurst=0.8, q0=2 * np.pi / 80, q1=2 * np.pi / 6.4, h_rms=1.0, h_max=3.3)
+    gradient = float(face.rms_gradient)
+    frames = []
+    for (_, psi, _), group in data.groupby(["seed", "psi", "target"]):
+        largest = float(group.p0_over_Eg.iloc[0]) * gradient
+        bodies = Bodies(hardness=gradient / psi, largest_pressure=largest)
+        s = group.p_over_p0.to_numpy()
+        pressed = contact(face, bodies, pressure=largest * s, theory="calibrated")
+        top = contact(face, bodies, pressure=largest, theory="calibrated")
+        K0 = top.unloading_stiffness
+        lifted = (pressed.mean_separation - top.mean_separation) * K0 / largest
+        own = group.assign(
+            stiffness=np.log(
+                pressed.unloading_stiffness / K0 / group.stiffness_over_peak
+            ),
+            area=np.log(pressed.area / top.area / group.area_over_peak),
+        )
+        inside = (s > LIGHT) & (s < 1)
+        below = own[inside].copy()
+        below["lift"] = np.log(np.asarray(lifted)[inside] / below.lift_times_k0_over_p0)
+        frames.append(below)
+    return pd.concat(frames)
+
+
+def other() -> str:
+    """Root mean squares of these, by psi."""
+    missed = missed_of_others()
+    lines = [
+        [psi, *(100 * rms(own[name]) for name in NAMES)]
+        for psi, own in missed.groupby("psi")
+    ]
+    return table("psi | stiffness [%] | area [%] | lift [%]", lines, "{:g} | {:.1f}")
+
+
+def grids(rows: pd.DataFrame) -> str:
+    """Root mean squares of ln of ratios on a grid over those on one twice as fine."""
+    lines: list[list[Cell]] = []
+    for _, own in rows[(rows.waves > 0) & (rows.s > LIGHT)].groupby(["seed", "psi"]):
+        counts = sorted(own.points.unique())
+        if len(counts) < 2:
+            continue
+        sides = [own[own.points == count].assign(s=own.s.round(2)) for count in counts]
+        both = [side.groupby(["s", "peak"])[list(NAMES)].mean() for side in sides]
+        ratio = np.log(both[0] / both[1]).dropna()
+        first = own.iloc[0]
+        lines.append(
+            [first.waves, first.psi, *(100 * rms(ratio[name]) for name in NAMES)]
+        )
+    header = "longest wavelengths a side | psi | stiffness [%] | area [%] | lift [%]"
+    return table(header, sorted(lines), "{:g} | {:g} | {:.1f}")
+
+
+def joint(Ra: float) -> Joint:
+    face = {"Ra": f"{Ra} um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+    area = "4 cm^2"
+    return Joint(face, face, bodies=METAL, nominal_area=area, theory="calibrated")
+
+
+def settling() -> str:
+    """Settling of ground steel joints, both faces alike."""
+    lines: list[list[Cell]] = []
+    for label, Ra in FACES.items():
+        lines.append([label, *map(float, joint(Ra).settling(list(LOADS), "0.5 MPa"))])
+    header = " | ".join(["both faces", *LOADS])
+    return table(header, lines, "{} | {:.2f}")
+
+
+def draw(rows: pd.DataFrame) -> Figure:
+    """A loop of pressure over gap, and stiffness below the largest pressure against simulations."""
+    figure = new_figure(10, 4.2)
+    loop, ratio = figure.subplots(1, 2)
+    steel = joint(0.8)
+    pressures = np.linspace(0.5, 60, 60)
+    first = steel.at_pressure([f"{p} MPa" for p in pressures])
+    later = steel.after("50 MPa").at_pressure(
+        [f"{p} MPa" for p in np.linspace(0, 50, 60)]
+    )
+    loop.plot(first.mean_separation, pressures, label="first loading")
+    loop.plot(later.mean_separation, 1e3 * later.pressure, label="after 50 MPa")
+    loop.set_xlabel("mean gap u [um]")
+    loop.set_ylabel("pressure [MPa]")
+    loop.legend()
+    for psi in SHOWN:
+        own = rows[np.isclose(rows.psi, psi) & (rows.waves > 2)]
+        ratio.plot(own.s, own.stiffness, ".", ms=3, label=f"simulated, psi {psi:g}")
+    s = np.linspace(0.005, 1, 100)
+    ratio.plot(s, s**0.5, "k:", label="s^(1/2)")
+    ratio.plot(s, s, "k--", lw=0.8, label="s")
+    ratio.set_xlabel("s = p/p0")
+    ratio.set_ylabel("K/K0")
+    ratio.legend()
+    return figure
