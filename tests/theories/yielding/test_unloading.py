@@ -213,6 +213,7 @@ def test_contacts_unlike_those_simulated_are_not_valid():
     assert "after a largest pressure of 0.1 GPa" in repr(valid)
 
 
+@pytest.mark.slow
 def test_the_law_holds_for_the_boundary_elements():
     """Stated scatter covers the simulations of docs/data, and few are farther off than the goals."""
     rows = unloading_fit.ratios(read_csv("unloading.csv.gz"))
