@@ -20,6 +20,7 @@ from generate.boundary_elements.surfaces import Recipe, heights
 from mbma_tables import Adhesion, Bodies, Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, MbmaError
+from mbma_tables.common.files import write_file
 from mbma_tables.theories import adhesion as theory
 from mbma_tables.theories.simulated.adhesive import AdhesiveContact
 
@@ -41,6 +42,12 @@ TABOR = (0.1, 0.2, 0.35, 0.5)
 AREAS = (0.002, 0.006, 0.02, 0.06, 0.15, 0.3, 0.55, 0.8)  # of elastic loads, about
 TOLERANCE = 1e-6
 GRADIENT = 0.1  # rms, of surfaces that theories are asked about
+HEAD = """\
+# Contacts with an exponential attraction by mbma_tables.theories.simulated.adhesive, by python -m generate adhesion.
+# Pressures over E* g, g the rms gradient; lengths and work over E* g in h_rms; tabor: Tabor's number of a summit; fitted: 1 where constants may see it.
+# area: A/A0 that touches, corrected for its edges; area_raw: share of points; area_compressed: of points with a net pressure; elastic_*: without attraction.
+# Empty: the attraction does not settle.
+"""
 COLUMNS = (
     *("hurst", "zeta_1", "waves", "seed", "fitted", "range", "tabor", "work"),
     *("contact_pressure", "net_pressure", "area", "area_raw", "area_compressed"),
@@ -177,7 +184,8 @@ def adhesion(data: pathlib.Path, compare: bool) -> None:
         rows = rows[whole]
     else:
         rows = pd.DataFrame(columns=list(COLUMNS))
-    rows.to_csv(data, index=False, lineterminator="\n", float_format="%.8g")
+    text = rows.to_csv(index=False, lineterminator="\n", float_format="%.8g")
+    write_file(data, (HEAD + text).encode())
     with data.open("a", encoding="utf-8", newline="") as opened:
         writer = csv.writer(opened, lineterminator="\n")
         for surface in SURFACES:

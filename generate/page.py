@@ -35,6 +35,7 @@ PAGES = {
     "theories": "pages.library:theories",
     "calibrated": "pages.laws:calibrated",
     "leakage": "pages.laws:leakage",
+    "adhesion": "pages.adhesion:adhesion",
     "export": "pages.export:formats",
     "gallery": "pages.maps:gallery",
     "machined": "pages.maps:machined",

@@ -36,6 +36,7 @@ MOST_STRENGTH = 0.05
 LEAST_RANGE = gap_law.RANGES[0]
 # standard deviation of ln A and of the gap over h_rms that the attraction adds, there
 AREA_ERROR = 0.02
+GAP_ERROR = 0.1  # of ln u over Tabor's number, likewise
 MODEL_ERROR = 0.25  # of ln of the attraction: what it deforms beside contacts
 MAP_ERROR = (
     0.03  # of the gaps of a simulated map, on 8 points to the shortest wave and more
@@ -366,8 +367,9 @@ class Adhesive(Theory):
             of_pull = np.hypot(self._scatter_of_gaps(surface, area), MODEL_ERROR)
             of_gaps = pull * of_pull / answer.pressure[0]
             if quantity == "pressure":
-                whole = np.hypot(elastic, of_gaps) * answer.pressure[0]
-                return np.asarray(whole / np.abs(net))
+                of_gap = GAP_ERROR * self.tabor(surface) * u * answer.stiffness[0]
+                passed_on = np.hypot(elastic, of_gaps) * answer.pressure[0]
+                return np.asarray(np.hypot(passed_on, of_gap) / np.abs(net))
             rises = np.log(answer.area[1] / answer.area[2]) / np.log(
                 answer.pressure[1] / answer.pressure[2]
             )
@@ -408,6 +410,9 @@ class Adhesive(Theory):
             f"adhesion: the range is below {LEAST_RANGE:g} h_rms, the shortest of gaps that were simulated": short,
             f"adhesion: the traction is above {MOST_STRENGTH:g} E* times the rms gradient, where {SIMULATE}": strong,
             "adhesion: only an exponential traction was simulated": other,
+            "adhesion: the net pressure is a tension, of which few contacts were simulated": (
+                answer.pressure < 0
+            ),
             "adhesion: the contact is beyond pull-off, where it is stable at a given gap alone": (
                 answer.stiffness < 0
             ),

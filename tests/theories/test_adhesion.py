@@ -154,6 +154,8 @@ def test_valid_ends_with_its_reasons():
     strong = pressed(hot, pressure="1 MPa")
     assert not strong.valid
     assert any("Tabor" in reason for reason in strong.reasons)
+    pulled = pressed(STICKY, pressure=-0.5 * float(light.pull_off))
+    assert any("tension" in reason for reason in pulled.reasons)
     short = Bodies("1000 GPa", adhesion=Adhesion("1 mJ/m^2", "0.5 nm"))
     assert any("range" in reason for reason in pressed(short, pressure="1 GPa").reasons)
 
