@@ -95,6 +95,29 @@ def slow(x, y):
     return smooth(x, y)
 
 
+def limping(x, y):
+    """As `smooth`, but 0.1 s a call in the first process that calls it, of those that add their numbers to a file."""
+    place = os.environ["MBMA_TEST_CALLS"]
+    with open(place, "a+") as stream:
+        stream.write(f"{os.getpid()}\n")
+        stream.flush()
+        stream.seek(0)
+        first = int(stream.readline())
+    time.sleep(0.1 if first == os.getpid() else 0.002)
+    return smooth(x, y)
+
+
+def killed_or_slow(number, mark, kills):
+    """The square of a number; the first call of 0 ends its process, or takes 2 s."""
+    if number == 0 and not os.path.exists(mark):
+        with open(mark, "w"):
+            pass
+        if kills:
+            os.kill(os.getpid(), 9)
+        time.sleep(2.0)
+    return number * number
+
+
 def replica(x, y, seed=0, *, unused=None):
     """One of many calibrations: exponents that differ a little."""
     return np.exp(x * y / 5) * x ** (1.5 + 0.02 * np.sin(7 * seed)), np.sin(x) * y

@@ -31,7 +31,7 @@ from generate.boundary_elements.solve import (
     load_at,
     prepared,
     pressed,
-    simulate_to,
+    simulated,
 )
 from generate.boundary_elements.surfaces import (
     CAMPAIGNS,
@@ -45,10 +45,11 @@ from generate.boundary_elements.surfaces import (
 from generate.calibrated_file import Variable, attributes, rms, variable, write_part
 from generate.timing import seconds_of_work
 from mbma_tables import Bodies, Surface, contact
+from mbma_tables.cli.options import work_options
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, InputError
 from mbma_tables.common.files import write_file
-from mbma_tables.common.workers import results
+from mbma_tables.common.workers import crew, part_of, share_of
 from mbma_tables.contacts.quantities.gas import mean_inverse
 from mbma_tables.surfaces.bearing_curve import FRACTIONS, QUANTILES, bearing
 from mbma_tables.surfaces.maps import prepared as treated_map
@@ -87,18 +88,33 @@ def run(
     folder: pathlib.Path,
     workers: int = 1,
     solve: Solve = SOLVERS["elastic"],
+    part: tuple[int, int] | None = None,
+    scheduler: str | None = None,
+    local_cluster: int | None = None,
 ) -> None:
-    """Solve what `folder` does not hold yet, one file a surface; those that fail are named at the end."""
+    """Solve what `folder` does not hold yet, one file a surface; those that fail are named at the end.
+
+    A file is written, whole, as soon as its surface is solved. Who does the work is said as
+    for tables of functions, `mbma_tables.tables.make_function.make`.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     missing = [
-        task.recipe for task in tasks if not is_solved(folder / f"{task.recipe.name}.npz")
+        task.recipe
+        for task in share_of(part, tasks)
+        if not is_solved(folder / f"{task.recipe.name}.npz")
     ]
-    work = functools.partial(simulate_to, solve=solve, folder=folder)
-    if failures := [
-        *filter(
-            None, results("surfaces", work, [(recipe,) for recipe in missing], workers)
+    jobs = [(recipe, solve) for recipe in missing]
+    failures = []
+    with crew(workers, scheduler, local_cluster) as run_jobs:
+        bar = tqdm(
+            run_jobs.as_finished(simulated, jobs), "surfaces", len(jobs), disable=None
         )
-    ]:
+        for name, found in bar:
+            if isinstance(found, str):
+                failures.append(f"{name}: {found}")
+            else:
+                write_file(folder / f"{name}.npz", found)
+    if failures:
         raise RuntimeError(
             f"{len(failures)} of {len(missing)} surfaces failed: {failures[0]}"
         )
@@ -260,12 +276,16 @@ def dataset(
 @click.option(
     "--workers", type=click.IntRange(1), default=1, show_default=True, help="Processes."
 )
+@work_options()
 def boundary_elements(
     kind: str,
     folder: pathlib.Path | None,
     target: pathlib.Path | None,
     points: int,
     workers: int,
+    part: str | None,
+    scheduler: str | None,
+    local_cluster: int | None,
 ) -> None:
     """Solve random surfaces by boundary elements (Tamaas, the extra `simulate`): four hours on two cores.
 
@@ -275,7 +295,7 @@ def boundary_elements(
     keeps every load at once: hours; give `--points 4096`.
 
     Stopped and called again, it goes on where it was. Small grids come first, every kind of
-    surface in turn.
+    surface in turn. The files of parts belong in one folder.
     """
     folder = folder or pathlib.Path("boundary_elements", kind)
     tasks = [task for task in campaign(kind) if task.recipe.points <= points]
@@ -286,8 +306,8 @@ def boundary_elements(
             f"{target}: {data.sizes['surface']} of {len(tasks)} surfaces, {target.stat().st_size} bytes"
         )
         return
-    solve = SOLVERS.get(kind) or functools.partial(KEEPING[kind], folder=folder)
-    run(tasks, folder, workers, solve)
+    solver = SOLVERS.get(kind) or functools.partial(KEEPING[kind], folder=folder)
+    run(tasks, folder, workers, solver, part_of(part), scheduler, local_cluster)
 
 
 DATA = pathlib.Path("docs/data")

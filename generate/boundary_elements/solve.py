@@ -391,18 +391,22 @@ SOLVERS: dict[str, Solve] = {
 KEEPING: dict[str, Callable[..., dict[str, Any]]] = {"bandwidth": simulate_wide}
 
 
-def write_npz(path: pathlib.Path, found: dict[str, Any]) -> None:
-    """Write arrays by name into a file, which stands only when it is whole."""
+def npz(found: dict[str, Any]) -> bytes:
+    """Arrays by name as a file."""
     content = io.BytesIO()
     np.savez_compressed(content, **found)
-    write_file(path, content.getvalue())
+    return content.getvalue()
 
 
-def simulate_to(recipe: Recipe, solve: Solve, folder: pathlib.Path) -> str | None:
-    """Simulate one surface into a file of its own, which stands only when it is whole; what failed, or None."""
+def write_npz(path: pathlib.Path, found: dict[str, Any]) -> None:
+    """Write arrays by name into a file, which stands only when it is whole."""
+    write_file(path, npz(found))
+
+
+def simulated(recipe: Recipe, solve: Solve) -> tuple[str, bytes | str]:
+    """The name of a surface and its file, or what failed."""
     try:
         found = solve(recipe)
     except (ArithmeticError, RuntimeError) as fault:
-        return f"{recipe.name}: {fault}"
-    write_npz(folder / f"{recipe.name}.npz", found)
-    return None
+        return recipe.name, str(fault)
+    return recipe.name, npz(found)

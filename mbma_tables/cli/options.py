@@ -424,6 +424,35 @@ def load_options(option: Callable[..., Decorator]) -> Decorator:
     )
 
 
+def work_options(of: str = "") -> Decorator:
+    """Who does many pieces of work, besides processes of this machine; `of` begins the help."""
+
+    def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
+        options = (
+            click.option(
+                "--part",
+                metavar="K/N",
+                help=f"{of}do part K of N, on one of N machines or in an array of jobs.",
+            ),
+            click.option(
+                "--scheduler",
+                metavar="ADDRESS",
+                help=f"{of}dask scheduler whose workers do it, such as tcp://host:8786.",
+            ),
+            click.option(
+                "--local-cluster",
+                type=click.IntRange(1),
+                metavar="N",
+                help=f"{of}a dask cluster of N processes, which replaces those that are killed.",
+            ),
+        )
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return with_options
+
+
 def json_option(instead: str) -> Decorator:
     """The option that prints JSON in place of a table, or of text."""
     return click.option(

@@ -2,20 +2,20 @@
 
 import json
 import os
-import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import click
 
-from mbma_tables.cli.options import json_option
+from mbma_tables.cli.options import json_option, work_options
 from mbma_tables.common import cache
 from mbma_tables.common.arguments import nearest
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import write_file
 from mbma_tables.common.netcdf import OWN, OWN_REMEDY, holds_own
 from mbma_tables.common.progress import echo
+from mbma_tables.common.workers import part_of
 from mbma_tables.tables.function_table import KIND as FUNCTION
 from mbma_tables.tables.function_table import REMEDY as OF_FUNCTIONS
 from mbma_tables.tables.function_table import FunctionTable
@@ -129,16 +129,7 @@ def _read_aloud(forecast: Any) -> str:
 @click.option(
     "--resume", is_flag=True, help="Of a function: go on with a run that ended early."
 )
-@click.option(
-    "--part",
-    metavar="K/N",
-    help="Of a function: make part K of N; `mbma tables merge` makes the table of all.",
-)
-@click.option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Of a function: dask scheduler whose workers call it, such as tcp://host:8786.",
-)
+@work_options("Of a function: ")
 def make_command(
     kind: str,
     config: Path | None,
@@ -172,7 +163,8 @@ def make_command(
         return
     given = [name for name, value in of_function.items() if value]
     if given:
-        raise InputError(f"--{given[0]} is for tables of functions, got KIND {kind}")
+        name = given[0].replace("_", "-")
+        raise InputError(f"--{name} is for tables of functions, got KIND {kind}")
     from mbma_tables.tables.configuration import load
 
     configuration = load(kind, config, target)
@@ -185,16 +177,6 @@ def make_command(
     echo(make.summary(out, content))
 
 
-def _part_of(text: str | None) -> tuple[int, int] | None:
-    """K and N of "K/N"."""
-    if text is None:
-        return None
-    numbers = re.fullmatch(r"(\d+)/(\d+)", text)
-    if numbers is None:
-        raise InputError(f"--part must be K/N, such as 1/4, got {text!r}")
-    return int(numbers[1]), int(numbers[2])
-
-
 def _make_of_function(
     reference: str,
     config: Path | None,
@@ -205,6 +187,7 @@ def _make_of_function(
     resume: bool,
     part: str | None,
     scheduler: str | None,
+    local_cluster: int | None,
 ) -> None:
     from mbma_tables.tables import make_function
     from mbma_tables.tables.make import check_place
@@ -220,7 +203,9 @@ def _make_of_function(
     if out is None:
         raise InputError("--out must name the file to write, such as --out mine.nc")
     check_place(out)
-    table = make_function.make(wanted, out, workers, resume, _part_of(part), scheduler)
+    table = make_function.make(
+        wanted, out, workers, resume, part_of(part), scheduler, local_cluster
+    )
     if table is None:
         echo(f"part {part}: its pieces are in {make_function.folder_of(out)}")
         return

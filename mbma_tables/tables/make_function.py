@@ -30,7 +30,7 @@ from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.files import write_file
 from mbma_tables.common.netcdf import write_own
 from mbma_tables.common.toml_files import check, read_toml
-from mbma_tables.common.workers import Crew, crew
+from mbma_tables.common.workers import Crew, crew, share_of
 from mbma_tables.tables.boxes import (
     MOST_HALVINGS,
     PENDING,
@@ -547,7 +547,6 @@ def grow(
     piece: Piece,
     kept: Kept,
     run: Crew,
-    workers: int,
     progress: Callable[[int], object],
 ) -> None:
     """Make a piece to its end, keeping its state every few seconds."""
@@ -558,7 +557,7 @@ def grow(
         x = _in_x(wanted, piece.points())
         size = wanted.chunk if wanted.vectorized else 1
         while len(values) < len(x):
-            ahead = size * workers * JOBS_AHEAD
+            ahead = size * run.size() * JOBS_AHEAD
             end = min(len(values) + ahead, len(x))
             jobs = [
                 (wanted, x[start : min(start + size, end)])
@@ -738,16 +737,6 @@ def write(path: pathlib.Path, table: FunctionTable) -> None:
     write_own(path, variables, table.attributes, KIND, FORMAT)
 
 
-def _my_share(part: tuple[int, int] | None, pieces: int) -> list[int]:
-    """Numbers of the pieces that part k of n makes."""
-    if part is None:
-        return [*range(pieces)]
-    k, n = part
-    if not 1 <= k <= n:
-        raise InputError(f"part must be k/n with 1 <= k <= n, got {k}/{n}")
-    return [*range(k - 1, pieces, n)]
-
-
 def folder_of(path: pathlib.Path) -> pathlib.Path:
     """The folder in which the pieces of a table are kept while it is made."""
     return path.with_name(f"{path.name}.pieces")
@@ -766,6 +755,7 @@ def make(
     resume: bool = False,
     part: tuple[int, int] | None = None,
     scheduler: str | None = None,
+    local_cluster: int | None = None,
 ) -> FunctionTable | None:
     """Make a table of a function, certify and write it.
 
@@ -784,6 +774,8 @@ def make(
         Make part k of n only; `merge` makes the table of all parts.
     scheduler : str, optional
         Address of a dask scheduler, whose workers call the function.
+    local_cluster : int, optional
+        Processes of a dask cluster on this machine, which replaces those that are killed.
 
     Returns
     -------
@@ -798,13 +790,13 @@ def make(
         If the target is not reached; what was found stays in the folder.
     """
     kept = Kept(folder_of(path), wanted)
-    share = _my_share(part, wanted.pieces)
+    share = share_of(part, range(wanted.pieces))
     kept.begin(resume or part is not None)
     pieces = pieces_of(wanted)
-    with crew(workers, scheduler) as run, _bar(wanted.function) as bar:
+    with crew(workers, scheduler, local_cluster) as run, _bar(wanted.function) as bar:
         for done, number in enumerate(share):
             bar.set_postfix_str(f"piece {done + 1} of {len(share)}", refresh=False)
-            grow(number, pieces[number], kept, run, workers, bar.update)
+            grow(number, pieces[number], kept, run, bar.update)
     if part is not None:
         return None
     table = table_of(wanted, pieces)

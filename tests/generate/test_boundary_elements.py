@@ -190,6 +190,31 @@ def test_other_campaigns_keep_what_their_files_hold(kind, tmp_path):
     assert len(campaign(kind)) == shipped.sizes["surface"]
 
 
+def test_parts_solve_the_same_surfaces(tmp_path):
+    tasks = [
+        Task(Recipe("self_affine", 0.8, 4, 2, seed, 32), "training") for seed in range(5)
+    ]
+    run(tasks, tmp_path / "all", solve=_heights)
+    run(tasks, tmp_path / "parts", solve=_heights, part=(1, 2))
+    first = {path.name for path in (tmp_path / "parts").iterdir()}
+    assert first == {f"{task.recipe.name}.npz" for task in tasks[::2]}
+    run(tasks, tmp_path / "parts", solve=_heights, part=(2, 2))
+    for task in tasks:
+        found = []
+        for folder in ("all", "parts"):
+            with np.load(tmp_path / folder / f"{task.recipe.name}.npz") as content:
+                found.append(content["heights"])
+        assert np.array_equal(found[0], heights(task.recipe))
+        np.testing.assert_equal(*found)
+    with pytest.raises(InputError, match="1 <= k <= n"):
+        run(tasks, tmp_path / "parts", part=(3, 2))
+
+
+def _heights(recipe):
+    """A solver that is quick: what is solved is not looked at here."""
+    return {"heights": heights(recipe)}
+
+
 def test_failures_come_last_and_are_named(tmp_path, monkeypatch):
     monkeypatch.setattr("generate.boundary_elements.solve.MAX_ITERATIONS", 2)
     tasks = [

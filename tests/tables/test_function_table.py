@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from mbma_tables import InputError, OutOfRangeError, TableFileError, open_table
 from mbma_tables.cli import main
+from mbma_tables.common.workers import crew
 from mbma_tables.tables import make_function
 from mbma_tables.tables.boxes import MOST_HALVINGS, Aim, Box, Piece, UnreachedError
 from mbma_tables.tables.make_function import make, merge, verified_errors, wanted_of
@@ -298,6 +299,54 @@ def test_workers_of_a_scheduler_make_the_same_table(tmp_path):
     ) as cluster:
         make(wanted, tmp_path / "there.nc", scheduler=cluster.scheduler_address)
     assert bits(tmp_path / "here.nc") == bits(tmp_path / "there.nc")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("function", ["slow", "limping"])
+def test_workers_that_are_killed_or_slow_make_the_same_table(
+    function, tmp_path, monkeypatch
+):
+    """A worker of a cluster ends by SIGKILL in its tenth call, or takes 50 times as long as the other."""
+    pytest.importorskip("distributed")
+    calls = tmp_path / "calls"
+    monkeypatch.setenv("MBMA_TEST_CALLS", str(calls))
+    monkeypatch.setenv("MBMA_TEST_END", "10")
+    entries = SMOOTH | {"pieces": 2, "chunk": 32, "certificate_points": 400}
+    wanted = wanted_of(entries | {"function": f"tabulated:{function}"}, target=1e-3)
+    make(wanted, tmp_path / "there.nc", local_cluster=2)
+    found = calls.read_text()
+    if function == "limping":
+        by_process = [found.split().count(one) for one in {*found.split()}]
+        assert min(by_process) < max(by_process)
+    else:
+        assert len(found) > 10
+    make(wanted_of(entries, target=1e-3), tmp_path / "here.nc")
+    assert bits(tmp_path / "here.nc") == bits(tmp_path / "there.nc")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("options", [{"workers": 2}, {"local_cluster": 2}])
+def test_results_come_as_they_are_finished(options, tmp_path):
+    """Those of a cluster also where a worker ends by SIGKILL; those of processes before a slow one's."""
+    cluster = "local_cluster" in options
+    if cluster:
+        pytest.importorskip("distributed")
+    jobs = [(number, str(tmp_path / "first"), cluster) for number in range(6)]
+    with crew(**options) as run:
+        found = [*run.as_finished(tabulated.killed_or_slow, jobs)]
+    assert sorted(found) == [0, 1, 4, 9, 16, 25]
+    assert (tmp_path / "first").exists()
+    assert cluster or found[0] != 0
+
+
+def test_two_clusters_are_refused(tmp_path):
+    with pytest.raises(InputError, match="not both"):
+        make(
+            wanted_of(SMOOTH),
+            tmp_path / "t.nc",
+            scheduler="tcp://localhost:1",
+            local_cluster=2,
+        )
 
 
 @pytest.mark.parametrize(
