@@ -235,6 +235,11 @@ def rough_contact(
             f"shape must be one of {SHAPES}, got {shape!r}; {nearest(str(shape), SHAPES)}"
         )
     law = contact_law(surface, bodies, theory, rtol=LAYER_RTOL)
+    if law.setup.bodies.adhesion is not None:
+        raise InputError(
+            "rough bodies that attract each other are not answered: their layer pulls beside "
+            "the contact, where the law ends; give bodies without adhesion"
+        )
     units = law.units
     plane = shape == "cylinder"
     largest = 1e30 * law.h_max

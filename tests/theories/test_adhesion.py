@@ -10,7 +10,16 @@ from scipy.integrate import quad
 from generate import files
 from generate.boundary_elements.solve import load_at, prepared
 from generate.boundary_elements.surfaces import Recipe, heights
-from mbma_tables import Adhesion, Bodies, Joint, Surface, contact, contact_law
+from mbma_tables import (
+    Adhesion,
+    Bodies,
+    Joint,
+    Scene,
+    Surface,
+    contact,
+    contact_law,
+    rough_contact,
+)
 from mbma_tables.common.errors import InputError, MissingError, OutOfRangeError
 from mbma_tables.common.units import Units
 from mbma_tables.contacts.sticking import sticking
@@ -158,6 +167,21 @@ def test_valid_ends_with_its_reasons():
     assert any("tension" in reason for reason in pulled.reasons)
     short = Bodies("1000 GPa", adhesion=Adhesion("1 mJ/m^2", "0.5 nm"))
     assert any("range" in reason for reason in pressed(short, pressure="1 GPa").reasons)
+
+
+def test_nothing_drops_the_attraction():
+    scene = Scene(
+        FACE, STICKY, pressure="2 MPa", theories=["persson"], theory="calibrated"
+    )
+    found = scene.run()
+    u = float(found.mean_separation[0])
+    other = contact(FACE, STICKY, mean_separation=u, theory="persson")
+    assert float(found.persson_pressure[0]) == pytest.approx(other.pressure, rel=1e-6)
+    assert float(found.area[0]) == pytest.approx(
+        pressed(STICKY, pressure="2 MPa").area, rel=1e-5
+    )
+    with pytest.raises(InputError, match="attract"):
+        rough_contact(FACE, "5 mm", STICKY, force="1 N", theory="calibrated")
 
 
 def held_out():

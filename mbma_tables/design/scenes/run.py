@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mbma_tables.bodies.adhesion import AdhesionInUnits
 from mbma_tables.bodies.materials import ELASTIC_PSI
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
@@ -27,6 +28,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories import resolve
+from mbma_tables.theories.adhesion import with_adhesion
 from mbma_tables.theories.hardness import with_hardness
 from mbma_tables.theories.mbma.models import get_model
 
@@ -334,6 +336,7 @@ def other_theory(
     gap: FloatArray,
     E_star: float,
     hardness: float = math.inf,
+    adhesion: AdhesionInUnits | None = None,
 ) -> Curve:
     """A theory, given as for `contact`, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
     from mbma_tables.theories.users import answer_where_finite
@@ -342,6 +345,8 @@ def other_theory(
     u = (float(surface.h_max) + gap) / 2
     if hardness < math.inf:
         chosen = with_hardness(chosen, hardness, E_star)
+    elif adhesion is not None:
+        chosen = with_adhesion(chosen, adhesion, E_star)
     answer = answer_where_finite(chosen, surface, u)
     of_pressure, of_area = answer._fields[:2]
     return Curve(
@@ -358,7 +363,10 @@ def comparison(run: Run, step: Step) -> None:
     """Another theory beside the scene's own."""
     scene = run.scene
     cap = float(scene.in_units.hardness)
-    other = other_theory(step.name, scene.surface, run.gap, scene.E_star, cap)
+    other = other_theory(
+        *(step.name, scene.surface, run.gap, scene.E_star, cap),
+        adhesion=scene.in_units.adhesion,
+    )
     for name, values in (("pressure", other.pressure), ("area", other.area)):
         letter = "F" if name == "pressure" else "A"
         meaning = f"{letter}/A0 by {step.name}"
