@@ -261,6 +261,10 @@ class Theory(abc.ABC):
         """Mean separation of first contact [length], where contact ends: h_max, of surfaces that did not yield."""
         return np.asarray(surface.h_max, dtype=float)
 
+    def unloads(self, surface: AnySurface, mean_separation: FloatArray) -> Any:
+        """Mask of contacts that a larger pressure came before, and yielding with it."""
+        return np.zeros(np.shape(mean_separation), bool)
+
     def domain(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
         """Mean separations [length] between which the theory answers.
 

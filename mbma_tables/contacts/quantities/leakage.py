@@ -463,6 +463,8 @@ def reasons_against(
         elif theory.elastic.name != "calibrated":
             alone = "leakage: flow through yielded contacts was compared for 'calibrated' alone"
             found[alone] = yields
+    after = "leakage: flow after a larger pressure was not compared with simulations"
+    found[after] = everywhere & theory.unloads(surface, u)
     for reason in theory.reasons_of_flow():
         found[reason] = everywhere
     return found

@@ -337,6 +337,10 @@ class Unloading(Theory):
         low, high = self.loading.domain(surface)
         return low, high if self.ends_at_h_max else self.interval(surface)[1]
 
+    def unloads(self, surface: AnySurface, mean_separation: FloatArray) -> Any:
+        peak = self.peak(surface)
+        return peak.remembered & (mean_separation > peak.mean_separation * (1 + ROUNDING))
+
     def bends(self, surface: AnySurface) -> FloatArray:
         """Mean separation at which the branches meet, and that of one bend more, if there is any."""
         peak, tail = self._curve(surface)
