@@ -45,6 +45,7 @@ STEPS = 80  # of an inverse
 NUMBERS = ("axis_numbers", "output_numbers")
 LANES = 4  # `MBMA_LANES` of mbma.h
 ROUNDING = 4e-15
+SOLVED = 1e-15  # relative, of an inverse; of a logarithm absolute where it is small
 
 
 @dataclasses.dataclass(frozen=True)
@@ -536,6 +537,12 @@ class FunctionTable:
         falls = np.nanmax(slopes, axis=0) < 0
         return np.asarray(rises.astype(int) - falls.astype(int))
 
+    def has_inverse(self, output: str, axis: str) -> bool:
+        """Whether an output increases, or decreases, everywhere along an axis."""
+        outputs = [each.name for each in self.outputs]
+        axes = [each.name for each in self.axes]
+        return bool(self._directions[outputs.index(output), axes.index(axis)])
+
     def inverse(self, axis: str, **given: ArrayLike) -> tuple[Any, Any]:
         """The number on an axis at which an output has a value, and a bound on its error.
 
@@ -605,8 +612,11 @@ class FunctionTable:
             np.full(target.size, float(axis.to_grid(e))) for e in (axis.low, axis.high)
         )
         span = high[0] - low[0]
+        # an exponential is solved by its logarithm, which is closer to a line
+        is_log = output.transform == "log"
+        goal, *stored = (np.log(v) if is_log else v for v in (target, *ends))
         with np.errstate(divide="ignore", invalid="ignore"):
-            part = (target - ends[0]) / (ends[1] - ends[0])
+            part = (goal - stored[0]) / (stored[1] - stored[0])
         part = np.nan_to_num(part, nan=0.5)
         t = low + (part if direction > 0 else 1 - part) * span
         active = np.arange(target.size)
@@ -614,8 +624,10 @@ class FunctionTable:
             points = x[active]
             points[:, a] = axis.from_grid(t[active])
             values, slopes, _, _ = self._answers(np.ascontiguousarray(points), True)
-            excess = direction * (values[:, k] - target[active])
-            by_t = slopes[:, k, a]
+            value, by_t = values[:, k], slopes[:, k, a]
+            if is_log:
+                value, by_t = np.log(value), by_t / value
+            excess = direction * (value - goal[active])
             if axis.transform == "log":
                 by_t = by_t * (points[:, a] + axis.offset)
             above = excess > 0
@@ -625,7 +637,8 @@ class FunctionTable:
             inside = (step > low[active]) & (step < high[active])
             middle = 0.5 * (low[active] + high[active])
             step = np.where(inside, step, middle)
-            near = np.abs(excess) <= 1e-15 * np.abs(target[active])
+            # what rounding leaves of a sum of this size
+            near = np.abs(excess) <= SOLVED * np.maximum(np.abs(goal[active]), is_log)
             moved = np.abs(step - t[active])
             t[active] = np.where(near, t[active], step)
             done = near | (moved <= 4e-16 * np.maximum(span, np.abs(t[active])))

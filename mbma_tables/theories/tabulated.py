@@ -163,14 +163,29 @@ class Tabulated(Theory):
         self, surface: AnySurface, quantity: str, wanted: FloatArray
     ) -> FloatArray:
         """Mean separation u [length] at a wanted "pressure" (over A0 E*) or "area", which the table must reach."""
-        ends = (self.answer(surface, end) for end in self.interval(surface))
-        largest, least = (np.asarray(getattr(answer, quantity)) for answer in ends)
+        gradient = np.asarray(surface.rms_gradient) if quantity == "pressure" else 1.0
+        ends = (self._arguments(surface, end) for end in self.interval(surface))
+        largest, least = (
+            self.contents.lookup(*end.values())[quantity] * gradient for end in ends
+        )
         wanted = np.asarray(wanted, dtype=float)
         inside = (wanted >= least) & (wanted <= largest)
         limits = f"{np.min(least):.4g} to {np.max(largest):.4g}"
         unit = " of E*" if quantity == "pressure" else ""
         require(quantity, wanted, inside, f"within the table's {limits}{unit}")
-        return super().mean_separation_at(surface, quantity, wanted)
+        axis = self.contents.axes[-1]
+        if not self.contents.has_inverse(quantity, axis.name):
+            return super().mean_separation_at(surface, quantity, wanted)
+        # only the last axis depends on the gap
+        numbers = self._arguments(surface, self.interval(surface)[0])
+        del numbers[axis.name]
+        # the ends of the table, up to rounding
+        low, high = (np.asarray(end) / gradient for end in (least, largest))
+        numbers[quantity] = np.clip(wanted / gradient, low, high)
+        place, _ = self.contents.inverse(axis.name, **numbers)
+        if axis.name == "compression":
+            return np.asarray(surface.h_max) * (1 - np.asarray(place))
+        return np.asarray(surface.h_rms) * np.asarray(place)
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length]: the table's work up to its end, and beyond the theory's own.
