@@ -184,8 +184,8 @@ class Tabulated(Theory):
         numbers[quantity] = np.clip(wanted / gradient, low, high)
         place, _ = self.contents.inverse(axis.name, **numbers)
         if axis.name == "compression":
-            return np.asarray(surface.h_max) * (1 - np.asarray(place))
-        return np.asarray(surface.h_rms) * np.asarray(place)
+            return np.asarray(np.asarray(surface.h_max) * (1 - place))
+        return np.asarray(np.asarray(surface.h_rms) * place)
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length]: the table's work up to its end, and beyond the theory's own.

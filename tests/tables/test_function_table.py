@@ -7,6 +7,7 @@ import pickle
 import subprocess
 import sys
 
+import mpmath
 import numpy as np
 import pytest
 import tabulated
@@ -134,6 +135,37 @@ def test_an_inverse_is_within_its_bound(smooth):
     one, _ = smooth.inverse("x", u=float(u[0]), y=float(y[0]))
     assert np.ndim(one) == 0
     assert abs(one / x[0] - 1) < 1e-7
+
+
+def test_derivatives_and_inverses_beside_thirty_digits(tmp_path):
+    """By mpmath on the formulas: each within its bound, derivatives also to 1e-9."""
+    entries = SMOOTH | {"outputs": {"u": {}, "v": {"error": "absolute"}}}
+    table = made(tmp_path, "smooth", entries, 1e-12)
+    draws = np.random.default_rng(9)
+    x, y = np.exp(draws.uniform(np.log(0.01), np.log(10), 60)), draws.random(60)
+    found = table.lookup(x, y, derivatives=1)
+    wanted = tabulated.smooth(x, y)[0]
+    inverse, inverse_error = table.inverse("x", u=wanted, y=y)
+    formulas = {
+        "u": lambda a, b: mpmath.exp(a * b / 5) * a ** mpmath.mpf(1.5),
+        "v": lambda a, b: mpmath.sin(a) * b,
+    }
+    with mpmath.workdps(30):
+        for k, point in enumerate(
+            zip(map(mpmath.mpf, x), map(mpmath.mpf, y), strict=True)
+        ):
+            for name, formula in formulas.items():
+                off = abs(float(found[name][k] - formula(*point)))
+                assert off <= found.error[name][k] <= 1e-6
+                for axis, orders in {"x": (1, 0), "y": (0, 1)}.items():
+                    exact = mpmath.diff(formula, point, orders)
+                    off = abs(float(found.derivatives[name][axis][k] - exact))
+                    assert off <= found.derivative_error[name][axis][k]
+                    assert off <= 1e-9 * max(1.0, abs(exact))
+            b, u = point[1], mpmath.mpf(wanted[k])
+            exact = mpmath.findroot(lambda a, b=b, u=u: formulas["u"](a, b) - u, point[0])
+            off = abs(float(mpmath.mpf(inverse[k]) - exact))
+            assert off <= inverse_error[k] <= 1e-9 * x[k]
 
 
 def test_an_inverse_of_what_turns_back_or_is_not_reached_is_refused(smooth):
