@@ -2,8 +2,7 @@
 
 Imports inside functions and under TYPE_CHECKING count, and so do the modules that a file
 with a call of `import_module` or `__import__` names in strings, whether in the call itself
-or in a table that the call reads. Registries alone may name the files that declare into
-them, of which they use nothing else.
+or in a table that the call reads.
 
 `python benchmarks/import_circles.py [package]` prints one line a circle, and ends with 1
 where there is one.
@@ -14,10 +13,6 @@ import pathlib
 import sys
 
 CALLS = ("import_module", "__import__")
-REGISTRIES = (
-    "mbma_tables.export.targets",
-    "generate.page",
-)
 
 
 def imports_of(name: str, path: pathlib.Path, known: set[str]) -> set[str]:
@@ -38,7 +33,7 @@ def imports_of(name: str, path: pathlib.Path, known: set[str]) -> set[str]:
             strings |= {node.value, f"{package}.{node.value.lstrip('.')}"}
         elif isinstance(node, ast.Call):
             imports_by_name |= name_of(node.func) in CALLS
-    if imports_by_name and name not in REGISTRIES:
+    if imports_by_name:
         found |= strings
     return {other for other in found & known if other != name}
 

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from generate.files import ROOT
-from generate.page import PAGES, measured, write
+from generate.page import Measured, write
 from mbma_tables.common.errors import MbmaError
 
 # imported when asked for: each needs packages of the extra "generate"
@@ -36,6 +36,41 @@ COMMANDS = {
     "tables": "generate.tables",
     "unloading": "generate.unloading",
 }
+
+# pages of the documentation, by the functions that measure them
+PAGES = {
+    "architecture": "pages.library:architecture",
+    "formula": "pages.library:formula",
+    "readme": "pages.library:readme",
+    "tables": "pages.library:tables",
+    "theories": "pages.library:theories",
+    "calibrated": "pages.laws:calibrated",
+    "leakage": "pages.laws:leakage",
+    "adhesion": "pages.adhesion:adhesion",
+    "export": "pages.export:formats",
+    "gallery": "pages.maps:gallery",
+    "machined": "pages.maps:machined",
+    "maps": "pages.maps:maps",
+    "data": "pages.simulations:data",
+    "fidelity": "pages.simulations:fidelity",
+    "joints": "pages.simulations:joints",
+    "tutorials/design": "pages.simulations:design",
+    "lubrication": "pages.simulations:lubrication",
+    "rough_bodies": "pages.simulations:rough_bodies",
+    "cost": "pages.cost:measure",
+    "stability": "pages.stability:measure",
+    "explorer": "explorer:measure",
+    # `yield` is a word of the language
+    "yield": "pages.laws:yielding",
+    "unloading": "pages.unloading:measure",
+}
+
+
+def measured(name: str) -> Measured:
+    module, _, function = PAGES[name].partition(":")
+    measure = getattr(importlib.import_module(f"generate.{module}"), function)
+    parts_and_files: Measured = measure()
+    return parts_and_files
 
 
 class Generator(click.Group):

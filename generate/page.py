@@ -1,15 +1,14 @@
 """Pages of the documentation: hand-written Markdown, with blocks and figures that programs fill.
 
-`PAGES` has for each page the function that measures it, as "module:function". It returns
-the text of the blocks between ``<!-- measured: BLOCK -->`` and ``<!-- end -->`` of the
-page, and figures and data by their path in the checkout. ``python -m generate pages NAME``
+`PAGES` of `__main__.py` has for each page the function that measures it. It returns the
+text of the blocks between ``<!-- measured: BLOCK -->`` and ``<!-- end -->`` of the page,
+and figures and data by their path in the checkout. ``python -m generate pages NAME``
 writes them.
 """
 
 from __future__ import annotations
 
 import contextlib
-import importlib
 import itertools
 import math
 import pathlib
@@ -27,45 +26,12 @@ from mbma_tables.common.plots import new_figure, to_picture
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAGES = {
-    "architecture": "pages.library:architecture",
-    "formula": "pages.library:formula",
-    "readme": "pages.library:readme",
-    "tables": "pages.library:tables",
-    "theories": "pages.library:theories",
-    "calibrated": "pages.laws:calibrated",
-    "leakage": "pages.laws:leakage",
-    "adhesion": "pages.adhesion:adhesion",
-    "export": "pages.export:formats",
-    "gallery": "pages.maps:gallery",
-    "machined": "pages.maps:machined",
-    "maps": "pages.maps:maps",
-    "data": "pages.simulations:data",
-    "fidelity": "pages.simulations:fidelity",
-    "joints": "pages.simulations:joints",
-    "tutorials/design": "pages.simulations:design",
-    "lubrication": "pages.simulations:lubrication",
-    "rough_bodies": "pages.simulations:rough_bodies",
-    "cost": "pages.cost:measure",
-    "stability": "pages.stability:measure",
-    "explorer": "explorer:measure",
-    # `yield` is a word of the language
-    "yield": "pages.laws:yielding",
-    "unloading": "pages.unloading:measure",
-}
 Picture: TypeAlias = "bytes | Figure"  # the content of a file, or what it is drawn from
 Measured: TypeAlias = tuple[dict[str, str], dict[str, Picture]]  # blocks and files
 # of a table: a tuple fills a format of several fields
 Cell: TypeAlias = str | float | tuple[str | float, ...] | None
 UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # of time, longest first
 MARKED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
-
-
-def measured(name: str) -> Measured:
-    module, _, function = PAGES[name].partition(":")
-    measure = getattr(importlib.import_module(f"generate.{module}"), function)
-    parts_and_files: Measured = measure()
-    return parts_and_files
 
 
 def fill(text: str, parts: Mapping[str, str]) -> str:

@@ -39,14 +39,6 @@ def test_a_hidden_circle_is_found(tmp_path, how):
     assert import_circles.circles(package) == [["planted.above", "planted.below"]]
 
 
-@pytest.mark.parametrize("registry", import_circles.REGISTRIES)
-def test_an_exception_is_one_of_a_registry_that_needs_it(monkeypatch, registry):
-    others = [name for name in import_circles.REGISTRIES if name != registry]
-    monkeypatch.setattr(import_circles, "REGISTRIES", others)
-    circles = import_circles.circles(ROOT / registry.partition(".")[0])
-    assert registry in [name for circle in circles for name in circle]
-
-
 def upward(graph):
     """Imports of a room from one that is above it, by the contract of layers."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from generate.page import Measured, table
-from mbma_tables.export.targets import AGAINST, Target, targets
+from mbma_tables.export.registry import targets
+from mbma_tables.export.targets import AGAINST, Target
 
 
 def formats() -> Measured:

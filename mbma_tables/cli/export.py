@@ -19,7 +19,8 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import MAX_BYTES, read_file, write_file
 from mbma_tables.common.progress import echo
 from mbma_tables.design.specimen import Specimen
-from mbma_tables.export.targets import Options, Target, targets, write_files
+from mbma_tables.export.registry import targets
+from mbma_tables.export.targets import Options, Target, write_files
 from mbma_tables.export.text import written_by
 
 if TYPE_CHECKING:

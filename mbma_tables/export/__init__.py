@@ -3,7 +3,7 @@
 
 def __getattr__(name: str) -> tuple[str, ...]:
     """Names of the targets of a group: SOLVERS, DATA, LAWS, FMUS, CODE."""
-    from mbma_tables.export.targets import GROUPS, targets
+    from mbma_tables.export.registry import GROUPS, targets
 
     if name not in GROUPS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -25,6 +25,7 @@ from mbma_tables.contacts.quantities.tangential import ratio_on
 from mbma_tables.export.code.languages import LANGUAGES
 from mbma_tables.export.exported_law import GasInGaps
 from mbma_tables.export.law_table import LawTable
+from mbma_tables.export.registry import targets
 from mbma_tables.export.rows.law_rows import describe_law
 from mbma_tables.export.targets import (
     AGAINST,
@@ -33,7 +34,6 @@ from mbma_tables.export.targets import (
     Options,
     Target,
     require_quantity,
-    targets,
     write_files,
 )
 from mbma_tables.surfaces.any_surface import AnySurface

@@ -1,10 +1,8 @@
-"""Targets: programs and formats that laws are written for, each declared once, in TARGETS of a module of `GROUPS`."""
+"""Declarations of targets, the programs and formats that laws are written for: each stands beside its writer."""
 
 from __future__ import annotations
 
 import dataclasses
-import functools
-import importlib
 import pathlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -25,14 +23,6 @@ LAW = frozenset(
 ROWS = LAW | {"rows", "rtol", "pressures", "leakage", "quantity", "peklenik", "direction"}
 CODE = LAW | {"name", "leakage", "direction", "quantity"}
 FRICTION = {"kappa", "friction", "friction_pressure"}
-# groups by the modules that declare them, in the order in which help lists them
-GROUPS = {
-    "SOLVERS": "rows.solvers",
-    "DATA": "rows.data",
-    "LAWS": "code.law_code",
-    "FMUS": "code.fmu",
-    "CODE": "model.c_code",
-}
 SI = ("m", "Pa")
 STAY_WITHIN_ROWS = (
     "Stay within the rows: the solver's behaviour beyond them was not tested."
@@ -304,13 +294,3 @@ def write_files(out: pathlib.Path, files: Mapping[str, bytes]) -> list[pathlib.P
 def require_quantity(name: str) -> None:
     """Refuse a name that is no quantity of rows: neither one of `AGAINST` nor one of the registry."""
     require_name("quantity of rows", name, dict.fromkeys((*AGAINST, *registry())))
-
-
-@functools.cache
-def targets(*groups: str) -> dict[str, Target]:
-    """Targets of some of `GROUPS`, or of all, by their names."""
-    modules = [
-        importlib.import_module(f"mbma_tables.export.{GROUPS[name]}")
-        for name in groups or GROUPS
-    ]
-    return {target.name: target for module in modules for target in module.TARGETS}

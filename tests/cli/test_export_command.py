@@ -14,7 +14,8 @@ from click.testing import CliRunner
 from mbma_tables.cli import main
 from mbma_tables.export import CODE
 from mbma_tables.export.model import c_code
-from mbma_tables.export.targets import ROWS, targets
+from mbma_tables.export.registry import targets
+from mbma_tables.export.targets import ROWS
 
 LAW = [
     "--surface",

@@ -19,8 +19,8 @@ from mbma_tables import (
 from mbma_tables.effects.force_law import plane_basis
 from mbma_tables.effects.rough_contact import CELLS
 from mbma_tables.export.code.law_code import law_files, law_text
+from mbma_tables.export.registry import targets
 from mbma_tables.export.rows.law_rows import describe_law
-from mbma_tables.export.targets import targets
 from mbma_tables.islands.greenwood_tripp import height_integral
 from mbma_tables.theories import Theory, TheoryAnswer
 

@@ -11,8 +11,8 @@ from helpers import law_of_names
 
 from mbma_tables import ContactLaw, Surface
 from mbma_tables.export.code.law_code import law_text
+from mbma_tables.export.registry import targets
 from mbma_tables.export.rows.solvers import FORMATS
-from mbma_tables.export.targets import targets
 
 # formats of rows of pressure
 PLAIN = [name for name in FORMATS if "pressure" in targets()[name].quantities]

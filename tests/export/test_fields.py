@@ -15,9 +15,9 @@ from law_points import needs
 from mbma_tables import Surface, contact_law, flow_factors
 from mbma_tables.cli import main
 from mbma_tables.export import DATA
+from mbma_tables.export.registry import targets
 from mbma_tables.export.rows import data, solvers
 from mbma_tables.export.rows.law_rows import describe_law
-from mbma_tables.export.targets import targets
 
 BEARING = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
 SI = {"length_unit": "m", "stress_unit": "Pa"}

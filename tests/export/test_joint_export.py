@@ -21,7 +21,7 @@ from test_programs import TOP, calculix, conductance, each, heated
 
 from mbma_tables import Bodies, InputError, Joint, contact
 from mbma_tables.cli import main
-from mbma_tables.export.targets import targets
+from mbma_tables.export.registry import targets
 from mbma_tables.export.text import number, template
 
 FACE = {"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}

@@ -12,10 +12,10 @@ from law_points import PLAIN
 
 from mbma_tables import Bodies, InputError, MbmaError, Surface, contact, contact_law
 from mbma_tables.export import law_table
+from mbma_tables.export.registry import targets
 from mbma_tables.export.rows import data, solvers
 from mbma_tables.export.rows.law_rows import FLOOR, describe_law
 from mbma_tables.export.rows.solvers import calculix
-from mbma_tables.export.targets import targets
 from mbma_tables.islands.variants import PRINTED
 from mbma_tables.theories import THEORIES, Mbma
 

@@ -18,9 +18,9 @@ from mbma_tables import InputError, Surface
 from mbma_tables.cli import main
 from mbma_tables.export.code.law_code import law_text
 from mbma_tables.export.law_table import LawTable
+from mbma_tables.export.registry import targets
 from mbma_tables.export.rows import data, solvers
 from mbma_tables.export.rows.law_rows import describe_law
-from mbma_tables.export.targets import targets
 from mbma_tables.export.text import number
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)

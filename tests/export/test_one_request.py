@@ -13,9 +13,9 @@ from helpers import refusals
 
 from mbma_tables import Bodies, Joint, Surface, contact_law
 from mbma_tables.cli import main
+from mbma_tables.export.registry import targets
 from mbma_tables.export.request import export_law
 from mbma_tables.export.rows.data import from_json, to_json
-from mbma_tables.export.targets import targets
 
 EXAMPLE = pathlib.Path(__file__).parents[2] / "examples" / "joint.toml"
 OF_LAWS = [name for name, each in targets().items() if name != "c"]

@@ -9,9 +9,10 @@ import pytest
 from test_code import HOSTILE
 
 from mbma_tables import InputError, Surface
+from mbma_tables.export.registry import targets
 from mbma_tables.export.rows.law_rows import describe_law
 from mbma_tables.export.rows.solvers import FORMATS
-from mbma_tables.export.targets import AGAINST, targets
+from mbma_tables.export.targets import AGAINST
 
 OF_ROWS = targets("SOLVERS", "DATA")
 OF_REGISTRY = "mean_pressure"

@@ -13,7 +13,7 @@ from generate.files import ROOT
 from generate.page import MARKED, fill, svg
 from generate.pages import export, library, maps, simulations, stability
 from mbma_tables import InputError, Surface, contact, theories
-from mbma_tables.export.targets import targets
+from mbma_tables.export.registry import targets
 
 SVG = b"<?xml"
 # corners of parameters
