@@ -31,8 +31,8 @@ from mbma_tables import (
 )
 from mbma_tables.cli import main
 from mbma_tables.contacts.quantities.gas import GASES
-from mbma_tables.export import targets
 from mbma_tables.export.code.law_code import law_text
+from mbma_tables.export.registry import targets
 from mbma_tables.export.rows.law_rows import describe_law
 from mbma_tables.theories.calibrated.theory import Calibrated
 
@@ -292,7 +292,7 @@ def test_friction_cards_have_the_stiffness_before_slip(joint):
     )  # fmt: skip
     assert np.interp(7.0, rows.x, rows.y) == pytest.approx(stick[1], rel=1e-2)
     with pytest.raises(InputError, match="takes no friction"):
-        targets.targets()["lsdyna"].files(
+        targets()["lsdyna"].files(
             describe_law(
                 joint.surface,
                 "57 GPa",
