@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import dataclasses
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
+from generate.boundary_elements.surfaces import Recipe, heights
 from generate.files import read_csv
 from generate.page import Cell, Measured, table
 from generate.unloading_fit import CLASSES, LIGHT, left_out, ratios, rms
 from mbma_tables import Bodies, Joint, Surface, contact
 from mbma_tables.common.plots import new_figure
+from mbma_tables.theories import Simulated
+from mbma_tables.theories.simulated.boundary_elements import Contact as BoundaryElements
 from mbma_tables.theories.yielding.unloading import ratio_scatter
 
 if TYPE_CHECKING:
@@ -21,6 +25,11 @@ NAMES = ("stiffness", "area", "lift")
 FACES = {"Ra 0.4 um": 0.4, "Ra 0.8 um": 0.8, "Ra 1.6 um": 1.6}
 METAL = "steel 1020"
 LOADS = ("10 MPa", "50 MPa", "100 MPa")
+# of a simulated map: points a side, psi, and pressures over the hardness, the largest first
+POINTS = 256
+PSI = 8
+SHARES_OF_HARDNESS = (0.05, 0.04, 0.025, 0.015, 0.005)
+FINE_TOLERANCE = 1e-6
 SHOWN = (2.5, 8.0)  # psi of the figure's points
 
 
@@ -31,6 +40,7 @@ def measure() -> Measured:
         "accuracy": accuracy(tested),
         "other": other(),
         "grids": grids(rows),
+        "maps": maps(),
         "settling": settling(),
     }
     return parts, {"docs/figures/unloading.svg": draw(rows)}
@@ -106,6 +116,35 @@ def grids(rows: pd.DataFrame) -> str:
         )
     header = "longest wavelengths a side | psi | stiffness [%] | area [%] | lift [%]"
     return table(header, sorted(lines), "{:g} | {:g} | {:.1f}")
+
+
+def maps() -> str:
+    """A simulated map after a largest pressure over boundary elements of it at twice the points."""
+    recipe = Recipe("self_affine", 0.8, 8.0, 4, 77, POINTS)
+    surface = Surface.from_map(heights(recipe), 1.0, periodic=True)
+    hardness = float(surface.rms_gradient) / PSI
+    fine = heights(dataclasses.replace(recipe, points=2 * POINTS))
+    engine = BoundaryElements(fine, (POINTS, POINTS), FINE_TOLERANCE, hardness)
+    pressures = hardness * np.array(SHARES_OF_HARDNESS)
+    bodies = Bodies(hardness=hardness, largest_pressure=pressures[0])
+    theory = Simulated(grid="full")
+    pressed: Any = contact(surface, bodies, pressure=pressures, theory=theory)
+    start = engine.press(pressures[0])["mean_separation"]
+    after = engine.unloading()
+    lines: list[list[Cell]] = []
+    lifted = pressed.mean_separation - pressed.mean_separation[0]
+    for k, pressure in enumerate(pressures):
+        found = after.press(float(pressure))
+        lift = found["mean_separation"] - start
+        lines.append(
+            [
+                float(pressure / pressures[0]),
+                pressed.stiffness[k] / after.frozen_stiffness(),
+                lifted[k] / lift if k else None,
+                pressed.area[k] / found["area"],
+            ]
+        )
+    return table("s | stiffness | lift | area", lines, "{:.2g} | {:.3f}")
 
 
 def joint(Ra: float) -> Joint:

@@ -333,7 +333,8 @@ class ContactLaw(Law, LawQuantities, Displayed):
         """The contact where F/A0 is `pressure`, on the branch of first contact; as `at`.
 
         With a hardness each of several pressures is reached by first loading from no contact,
-        also where they fall: a law does not know of a larger pressure before.
+        also where they fall: a law knows of a larger pressure before only where it was made
+        with `largest_pressure`.
         """
         return self.at(pressure=pressure)
 
