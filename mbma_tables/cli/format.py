@@ -271,7 +271,8 @@ def report_answer(
     units: Mapping[str, str] = MappingProxyType({}),
 ) -> Report:
     """The report of a command that evaluated the model; `units` are those that do not follow from names."""
-    surface, notes = _surface_facts(specimen)
+    simulated = model.theory.surface_of(specimen.surface)
+    surface, notes = _surface_facts(dataclasses.replace(specimen, surface=simulated))
     stress = specimen.stress_unit or ""
     scale = "forces are over E*, since no modulus was given"
     if specimen.E_star is not None:

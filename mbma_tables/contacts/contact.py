@@ -86,7 +86,8 @@ def contact(
         `mbma_tables.theories` with its own options, such as ``Mbma(island_model="exact")``,
         or any with a `name` and ``answer(surface, u)``. Default, here and wherever a theory
         can be given: "mbma" at a `separation`, its coordinate; otherwise "simulated" for a
-        resolved map of at most 2^18 points, and "calibrated" for any other surface.
+        map of at least 64 points a side, and "calibrated" for any other surface. A raw map
+        is simulated at a cut-off that the `surface` of the contact names (`resolution`).
 
     Returns
     -------
@@ -147,7 +148,9 @@ def contact_of(
         else Bodies.of(bodies).in_units(surface)
     )
     question = Question.of(in_units.units, candidates)
-    setup = Setup(surface, in_units, resolve(theory, surface, question.name), interface)
+    chosen = resolve(theory, surface, question.name)
+    surface = chosen.surface_of(surface)
+    setup = Setup(surface, in_units, chosen, interface)
     numbers = in_units.E_star, in_units.hardness, in_units.largest
     if any_labelled(surface, question.value, *numbers):
         return _of_labelled(setup, question)

@@ -304,7 +304,13 @@ def table_of_loads(
         name: np.asarray(getattr(found, name))[reached] for name in names
     }
     reasons = found.reasons
-    everywhere = resolve(theory, surface, "area").departures(surface)
+    chosen = resolve(theory, surface, "area")
+    everywhere = chosen.departures(surface)
+    told += [
+        f"table: {entry['told']}"
+        for entry in chosen.surface_of(surface).provenance
+        if entry.get("chosen")
+    ]
     told += [
         f"not valid at {contacts(areas[m])}: {text}"
         for text, m in reasons.items()

@@ -154,12 +154,14 @@ class AnySurface(Displayed, abc.ABC):
     def resolution(self) -> str:
         """Shortest wavelength of a measured surface, and what shorter ones change.
 
+        With the cut-off that a simulation chose.
+
         Empty for a surface that was not measured.
         """
         descriptions = [
             entry["told"]
             for entry in self.provenance
-            if entry["step"] in ("resolution", "extrapolated")
+            if entry["step"] in ("resolution", "extrapolated") or entry.get("chosen")
         ]
         return "; ".join(descriptions)
 

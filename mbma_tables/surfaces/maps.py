@@ -27,6 +27,7 @@ from mbma_tables.surfaces.treatment import (
     mirrored,
     squares,
     treat,
+    within,
 )
 
 S = TypeVar("S", bound=SpectralSurface)
@@ -35,6 +36,8 @@ RINGS = 8
 # slopes on 2% of the points only; Gaussian surfaces have 3, worn or scratched ones up to 10
 # or 20
 MAX_KURTOSIS = 50.0
+# steps of a provenance that are made anew where wavelengths are left out
+OF_SPECTRUM = ("window", "few wavelengths", "corners", "resolution")
 STEPS_PER_OCTAVE = 8  # of an extrapolated spectrum
 # grid steps in wavenumber; a window weights the few wavelengths below at random; none lies
 # on this limit
@@ -397,6 +400,36 @@ def measured_surface(
         surface = dataclasses.replace(surface, h_max=h_max)
     surface = surface.resolved()
     return surface if shortest is None else extrapolated(surface, shortest, hurst)
+
+
+def without_shorter(surface: S, wavelength: float, why: str) -> S:
+    """The surface of a map without its wavelengths below one [length].
+
+    `why` says in the provenance what they are left out for.
+    """
+    assert surface.map is not None
+    treatment = Treatment(short_cutoff=wavelength)
+    cut = within(dataclasses.replace(surface.map, provenance=()), treatment)
+    (step,) = cut.provenance
+    record = {**step, "chosen": True, "told": f"{step['told']}; {why}"}
+    less = measured_surface(dataclasses.replace(cut, provenance=(record,)))
+    # a highest point that was given stays as it is
+    is_own_top = math.isclose(surface.h_max, surface.heights.h_max, rel_tol=1e-9)
+    earlier = [step for step in surface.provenance if step["step"] not in OF_SPECTRUM]
+    later = [step for step in less.provenance if step["step"] not in ("read", "edges")]
+    return dataclasses.replace(
+        surface,
+        q=less.q,
+        C=less.C,
+        h_max=less.h_max if is_own_top else surface.h_max,
+        heights=less.heights,
+        bearing=less.bearing,
+        bands=less.bands,
+        map=less.map,
+        samples=less.samples,
+        anisotropy=less.anisotropy,
+        provenance=(*earlier, *later),
+    )
 
 
 def extrapolated(surface: S, shortest: Any, hurst: Any) -> S:

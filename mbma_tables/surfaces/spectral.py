@@ -306,17 +306,13 @@ class SpectralSurface(AnySurface):
         )
 
     def simulating(self, name: str = "surface") -> str:
-        """A call that simulates the map, as far as it resolves wavelengths.
+        """A call that simulates the map, at wavelengths that its sampling resolves.
 
         Empty where there is no map.
         """
         if self.map is None or self.map.heights.ndim != 2:
             return ""
-        from mbma_tables.surfaces.map_simulation import resolving
-
-        cutoff = resolving(self.shortest(ROUNDED), max(self.map.steps), self.unit)
-        face = f"Surface.from_map(..., {cutoff})" if cutoff else name
-        return f"contact({face}, ..., theory='simulated')"
+        return f"contact({name}, ..., theory='simulated')"
 
     def power_spectrum(self, q: ArrayLike) -> Any:
         """C(q) [length^4], a power law between samples, zero outside [q0, q1]."""

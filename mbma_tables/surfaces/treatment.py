@@ -255,11 +255,7 @@ def treat(
         treated = _filled(_without_outliers(treated, treatment.outliers), treatment.fill)
         treated = _without_seams(treated)
         treated = _without_sharp_places(treated, heights)
-        treated = _within(_flattened(treated, treatment.detrend), treatment)
-    ends = [2 * math.pi / treatment.short_cutoff] if treatment.short_cutoff else []
-    ends += [last_wave(treatment.s_filter)] if treatment.s_filter else []
-    longest = 2 * math.pi / (treatment.long_cutoff or math.inf)
-    return dataclasses.replace(treated, waves=(longest, min(ends, default=math.inf)))
+        return within(_flattened(treated, treatment.detrend), treatment)
 
 
 def _flattened(treated: Treated, mode: str | None) -> Treated:
@@ -590,7 +586,7 @@ def _filled(treated: Treated, fill: str | None) -> Treated:
     )
 
 
-def _within(treated: Treated, treatment: Treatment) -> Treated:
+def within(treated: Treated, treatment: Treatment) -> Treated:
     """Heights whose wavelengths lie between both cut-offs, or filters."""
     long = treatment.long_cutoff
     short = treatment.short_cutoff
@@ -643,7 +639,15 @@ def _within(treated: Treated, treatment: Treatment) -> Treated:
             of_gradient=of_gradient,
             of_variance=of_variance,
         )
-    return dataclasses.replace(treated, heights=values[whole]) if requested else treated
+    if not requested:
+        return treated
+    low, high = treated.waves
+    ends = [2 * math.pi / short] if short else []
+    ends += [last_wave(treatment.s_filter)] if treatment.s_filter else []
+    waves = max(low, 2 * math.pi / (long or math.inf)), min(ends, default=high)
+    return dataclasses.replace(
+        treated, heights=values[whole], waves=(waves[0], min(high, waves[1]))
+    )
 
 
 def without_polynomial(heights: FloatArray, degree: int) -> FloatArray:

@@ -198,8 +198,8 @@ def default_name(
     str
         The theory that has the options, if there are any. Else "mbma" at a given separation
         d, which is MBMA's coordinate; "simulated" for a surface opened from the table of its
-        simulation, and for a map that is resolved and of at most 2^18 points; and
-        "calibrated" for every other surface.
+        simulation, and for a map of at least 64 points a side; and "calibrated" for every
+        other surface.
 
     Examples
     --------

@@ -199,6 +199,10 @@ class Theory(abc.ABC):
         answer = self.answer(surface, gaps.mean_separation)
         return solved_by(answer, modulus)
 
+    def surface_of(self, surface: AnySurface) -> AnySurface:
+        """The surface that its answers are of: the given one, unless it chooses a cut-off."""
+        return surface
+
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """Reasons why a measured surface violates the theory's assumptions.
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers import random_map, refused, run, topographies
 
-from mbma_tables import Surface
+from mbma_tables import Surface, contact
 from mbma_tables.common.errors import InputError
 from mbma_tables.contacts.measurement import table_of_loads
 from mbma_tables.design.specimen import read_specimen
@@ -176,7 +176,7 @@ def test_an_array_in_a_file_needs_its_step(tmp_path):
         )
     )
     assert known["surface"]["h_rms"] == pytest.approx(
-        float(Surface.from_map(path, dx=0.5).h_rms)
+        float(contact(Surface.from_map(path, dx=0.5), area=0.01).surface.h_rms)
     )
 
 

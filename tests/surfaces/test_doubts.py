@@ -1,5 +1,6 @@
 """Measurements that may not represent their surface: results are not valid, and the stated remedy works."""
 
+import dataclasses
 import re
 
 import numpy as np
@@ -18,6 +19,7 @@ from generate.machined.makers import FAMILIES, Part, finished, heights, rough
 from mbma_tables import OutOfRangeError, Surface, contact
 from mbma_tables.surfaces.averages import average
 from mbma_tables.theories import Simulated
+from mbma_tables.theories.simulated.grids import GRIDS
 
 topographies()
 
@@ -213,15 +215,47 @@ def test_a_spectrum_without_its_convention_is_not_valid():
 class TestSampling:
     """Maps with wavelengths of fewer than four sampling steps."""
 
+    NOISY = MAP + 0.02 * MAP.std() * np.random.default_rng(2).standard_normal(MAP.shape)
+
     @pytest.mark.parametrize("unit", [None, "um"])
     @pytest.mark.parametrize("step", [1.0, 0.123456])
     @pytest.mark.parametrize("grid", ["quick", "full"])
-    def test_the_stated_cutoff_makes_it_valid(self, unit, step, grid):
-        noise = MAP + 0.02 * MAP.std() * np.random.default_rng(2).standard_normal(
-            MAP.shape
-        )
-        given = {"heights": step * noise, "dx": step, "periodic": True, "unit": unit}
+    @pytest.mark.parametrize("periodic", [True, False])
+    def test_a_cutoff_is_chosen_and_named(self, unit, step, grid, periodic):
+        given = {"heights": step * self.NOISY, "dx": step, "periodic": periodic}
+        given["unit"] = unit
         found = asked(Surface.from_map(**given), Simulated(grid))
+        assert found.valid
+        named = re.search(r"short_cutoff='?([\d.]+(?: um)?)'?", found.surface.resolution)
+        again = asked(Surface.from_map(**given, short_cutoff=named[1]), Simulated(grid))
+        assert again.pressure == found.pressure
+        assert again.surface.map.heights == pytest.approx(found.surface.map.heights)
+        assert named[0] in repr(found)
+
+    def test_a_highest_point_that_was_given_stays(self):
+        found = asked(of(self.NOISY, h_max=2.0))
+        assert found.surface.h_max == 2.0
+        assert found.valid
+
+    def test_a_cutoff_that_was_given_is_simulated_on_a_finer_grid(self):
+        shorter = of(self.NOISY, short_cutoff=2.5)
+        found = asked(shorter, Simulated("full"))
+        assert found.valid
+        assert found.elastic_theory.pressed.heights.shape == (128, 128)
+        # the same waves on twice as many points a side
+        fine = np.zeros((128, 128), complex)
+        inner = np.ix_(*(np.r_[0:32, 97:128],) * 2)
+        outer = np.ix_(*(np.r_[0:32, 33:64],) * 2)
+        fine[inner] = np.fft.fft2(shorter.map.heights)[outer]
+        finer = Surface.from_map(4 * np.fft.ifft2(fine).real, 0.5, periodic=True)
+        again = asked(finer, Simulated("full"))
+        assert found.pressure == pytest.approx(again.pressure, rel=found.area_scatter)
+
+    def test_of_a_large_map_the_reason_names_a_cutoff_that_is_valid(self, monkeypatch):
+        few = dataclasses.replace(GRIDS["quick"], most_points=MAP.size)
+        monkeypatch.setitem(GRIDS, "quick", few)
+        given = {"heights": self.NOISY, "dx": 1.0, "periodic": True}
+        found = asked(of(self.NOISY, short_cutoff=2.5))
         assert not found.valid
         assert pasted(found, given, area=0.1).valid
 
@@ -262,7 +296,7 @@ class TestSampling:
         both = average([of(values) for values in maps])
         found = contact(both, area=0.1, theory="calibrated")
         given = {"heights": maps[0], "dx": 1.0, "periodic": True}
-        assert ("surface.scans[0]" in str(found.reasons)) == (noise == 0)
+        assert "surface.scans[0]" in str(found.reasons)
         assert pasted(found, given, surface=both, area=0.1).valid
 
 

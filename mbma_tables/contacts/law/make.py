@@ -57,7 +57,7 @@ def contact_law(
         it is the law of first loading, which has no `energy`, unless a largest pressure is
         given.
     theory : str or theory, optional
-        As for `contact`; by default "simulated" for a resolved map, else "calibrated". The
+        As for `contact`; by default "simulated" for a map, else "calibrated". The
         law covers the gaps that the theory answers: with ``Mbma(outside="exact")`` also
         those whose islands no table covers.
     largest_pressure : float or str, optional
@@ -123,7 +123,9 @@ def law_of(
     one = _one_surface(surface)
     chosen = resolve(theory, surface)
     before = None if largest is None else float(largest)
-    setup = Setup(one, given.at(modulus, float(hardness), before), chosen, interface)
+    simulated = chosen.surface_of(one)
+    loaded = given.at(modulus, float(hardness), before)
+    setup = Setup(simulated, loaded, chosen, interface)
     loading = setup.theory_of(setup.bodies)
     least = max(chosen.rtol, MIN_LAW_RTOL, loading.least_rtol)
     asked = least if rtol is None else rtol

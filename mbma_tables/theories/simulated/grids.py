@@ -53,7 +53,9 @@ class Grid:
         sensitivity, against contact on the full grid at tolerance 1e-6: the larger of the 70%
         and half of the 97.5% quantile of the errors.
     halvings : int
-        How often the number of points along each side is halved.
+        How often the number of points along each side is halved at least.
+    most_points : int
+        Points above which a map is halved further.
     simulates_all : bool
         Whether flow and a hardness are simulated on it too. Otherwise flow is that of the full
         grid at equal pressure, and a hardness is by the law of hardness.
@@ -65,6 +67,7 @@ class Grid:
     tested: tuple[float, float]
     scatters: Mapping[str, tuple[float, ...]]
     halvings: int = 0
+    most_points: int = 2**20
     simulates_all: bool = True
 
     @property
@@ -99,6 +102,8 @@ QUICK = Grid(
         "stiffness": (0.0361, 0.0135, 0.00813, 0.00772, 0.0076, 0.0054, 0.0131),
         "flow": FLOW_SCATTER,
     },
+    # about 15 s of one core
+    most_points=2**19,
     simulates_all=False,
 )
 GRIDS = {grid.name: grid for grid in (FULL, HALF, QUICK)}

@@ -30,6 +30,7 @@ from mbma_tables.theories.simulated.energy_spline import LoadCurve
 from mbma_tables.theories.simulated.grids import (
     FULL,
     GRIDS,
+    HALF,
     TESTED_AREAS,
     Grid,
     steps_along,
@@ -97,8 +98,10 @@ class BoundaryElements(Theory):
         origin: str,
         grid: Grid = FULL,
         top: float | None = None,
+        given: MeasuredSurface | None = None,
     ) -> None:
         self.grid = grid
+        self.given = surface if given is None else given
         # a table without its map is not pressed anew
         self.presses_anew = isinstance(pressed, Press) and grid.simulates_all
         self.surface, self.rows, self.points, self.pressed, self.origin = (
@@ -139,33 +142,36 @@ class BoundaryElements(Theory):
         chosen = GRIDS[grid]
         table = (
             surface.table
-            if isinstance(surface, MeasuredSurface) and chosen is FULL
+            if isinstance(surface, MeasuredSurface) and chosen.name == FULL.name
             else None
         )
         if table is not None:
             return cls(surface, table.rows, table.points, table, table.origin)  # type: ignore[arg-type]
-        whole = own_map.map_of(surface)
+        own_map.map_of(surface)
         assert isinstance(surface, MeasuredSurface)
-        steps = steps_along(surface, whole)
+        simulated = own_map.resolved(surface, chosen)
+        whole = own_map.map_of(simulated)
+        steps = steps_along(simulated, whole)
         mirrored = not whole.periodic
         values, points, cut = own_map.reduced(
-            whole.heights - whole.heights.mean(), steps, mirrored, chosen.halvings
+            whole.heights - whole.heights.mean(), steps, mirrored, chosen
         )
         press = Press(
             values,
             own_map.sides(whole),
-            own_law(surface).gradient,
+            own_law(simulated).gradient,
             chosen.tolerance,
             mirrored,
             left_out=cut * max(whole.steps),
         )
-        force, rows = press.loads(own_map.law_loads(surface, chosen.areas), True)
+        force, rows = press.loads(own_map.law_loads(simulated, chosen.areas), True)
         digest = hashlib.sha256(
             np.ascontiguousarray(whole.heights, "<f8").tobytes()
         ).hexdigest()[:16]
         own = f"of the map of {' x '.join(map(str, whole.heights.shape))} points with SHA-256 {digest}"
         origin = f"boundary elements, tolerance {chosen.tolerance:g}, {own}"
-        return cls(surface, np.array([force, *rows]), points, press, origin, chosen)
+        rows = np.array([force, *rows])
+        return cls(simulated, rows, points, press, origin, chosen, given=surface)
 
     def to_netcdf(self, path: os.PathLike[str] | str) -> None:
         """Write a table that opens without the map.
@@ -188,6 +194,10 @@ class BoundaryElements(Theory):
     def from_netcdf(cls, path: os.PathLike[str] | str) -> BoundaryElements:
         """Open such a table (`TableFileError` if damaged or edited); for its `.surface` "simulated" is the default."""
         return cls.of(own_map.read_surface(path))
+
+    def surface_of(self, surface: AnySurface) -> AnySurface:
+        """The surface that is simulated: the given one, without wavelengths that no grid resolves."""
+        return self.surface if surface is self.given else surface
 
     def departures(self, surface: AnySurface) -> tuple[str, ...]:
         """What is doubtful about the measurement; the theory is of this map, whatever its statistics."""
@@ -257,7 +267,8 @@ class BoundaryElements(Theory):
             f"wavelengths below {left_out:.4g} were left out, since the grid has fewer "
             "points than the map"
         )
-        if self.grid.halvings:
+        fits = whole is not None and whole.heights.size <= FULL.most_points
+        if self.grid.name != FULL.name and fits:
             cut += f": contact(surface, ..., theory={FULL.call}) leaves none out"
         return {
             coarse: np.full(area.shape, self.points < MIN_POINTS * (1 - ROUNDING)),
@@ -364,8 +375,12 @@ class BoundaryElements(Theory):
     def flows(self) -> tuple[FloatArray, FloatArray]:
         """Mean gaps, falling, and flow coefficients xx, yy and xy there, found when they are first read."""
         if not self.grid.simulates_all:
-            # those of the full grid, at the gaps that this one has under the same loads
-            full = simulation_of(self.surface, FULL.name)
+            # those of the full grid, at the gaps that this one has under the same loads; on
+            # half of the points where this one has fewer, too
+            assert self.surface.map is not None
+            assert isinstance(self.pressed, Press)
+            is_whole = self.pressed.heights.size >= self.surface.map.heights.size
+            full = simulation_of(self.surface, FULL.name if is_whole else HALF.name)
             full_gaps, flow = full.flows
             return self.fit.separation(full.fit.log_force(full_gaps)), flow
         return self.pressed.flows(self.fit.x, self.fit.separation)
@@ -439,8 +454,10 @@ class BoundaryElements(Theory):
         """Mean separations of this map; bodies that are apart are at first contact."""
         for name in ("h_rms", "h_max"):
             own = float(getattr(self.surface, name))
+            other = float(getattr(self.given, name))
             given = np.asarray(getattr(surface, name))
             good = np.abs(given - own) <= MATCHED * own
+            good |= np.abs(given - other) <= MATCHED * other
             require(
                 name,
                 given,

@@ -12,16 +12,24 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError, TableFileError
 from mbma_tables.common.netcdf import OWN_REMEDY, read_own, write_own
+from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.bearing_curve import Bearing, RadialSpectrum
 from mbma_tables.surfaces.heights import Heights
-from mbma_tables.surfaces.map_simulation import MIN_POINTS, ROUNDING, MapSimulation
+from mbma_tables.surfaces.map_simulation import (
+    MIN_POINTS,
+    ROUNDING,
+    MapSimulation,
+    cutting,
+)
+from mbma_tables.surfaces.maps import without_shorter
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.surfaces.treatment import Treated
 from mbma_tables.theories.calibrated.curves import own_law
+from mbma_tables.theories.simulated.boundary_elements import composed, waves
+from mbma_tables.theories.simulated.grids import Grid, steps_along
 from mbma_tables.theories.simulated.pressing import coarser
 
-MOST_POINTS = 2**20  # points of the largest map that is simulated without change
 REFINED = 200  # steps of ln F at which the law's area is inverted, an octave
 
 ROWS = {
@@ -50,18 +58,59 @@ def sides(treated: Treated) -> tuple[float, float]:
     ] * treated.steps[1]
 
 
+@shared(8)
+def resolved(surface: MeasuredSurface, grid: Grid) -> MeasuredSurface:
+    """The surface of which the simulation of a map is: without wavelengths that its grid does not sample.
+
+    The surface itself where the map has enough sampling steps along its shortest wavelength,
+    or a cut-off that was given: a simulation does not choose another one.
+    """
+    whole = map_of(surface)
+    points = steps_along(surface, whole)
+    if points >= MIN_POINTS * (1 - ROUNDING) or np.isfinite(whole.waves[1]):
+        return surface
+    step = max(whole.steps) * 2 ** halvings_of(whole.heights, grid)
+    # of as many digits as are printed, so that the printed one gives the same answer
+    cutoff = float(f"{1.001 * MIN_POINTS * step:.4g}")
+    why = (
+        f"chosen for the simulation, whose grid has {MIN_POINTS:g} steps along it: "
+        f"{cutting(cutoff, surface.unit)} of Surface.from_map sets the instrument's"
+    )
+    return without_shorter(surface, cutoff, why)
+
+
+def halvings_of(heights: FloatArray, grid: Grid) -> int:
+    """How often a map's points are halved along each side for a grid, which has a largest size."""
+    size, halvings = heights.size, 0
+    while halvings < grid.halvings or size > grid.most_points:
+        size //= 4
+        halvings += 1
+    return halvings
+
+
+def refined(values: FloatArray, mirrored: bool) -> FloatArray:
+    """A map on twice as many points along each axis, by its waves."""
+    from scipy.signal import resample
+
+    rows, columns = (2 * count for count in values.shape)
+    if mirrored:
+        return composed(waves(values, True), (rows, columns), True)
+    return np.asarray(resample(resample(values, rows), columns, axis=1))
+
+
 def reduced(
-    values: FloatArray, points: float, mirrored: bool, halvings: int = 0
+    values: FloatArray, points: float, mirrored: bool, grid: Grid
 ) -> tuple[FloatArray, float, float]:
-    """A map halved so often, and until it has few enough points.
+    """A map halved for a grid, or refined for a short cut-off that was given.
 
     With sampling steps along its shortest wavelength, and the cut-off in steps of the whole map.
     """
     step = 1.0
     cut = 0.0
-    halved = 0
-    while halved < halvings or values.size > MOST_POINTS:
-        halved += 1
+    is_fine = points >= MIN_POINTS * (1 - ROUNDING)
+    if not is_fine and not grid.halvings and 4 * values.size <= grid.most_points:
+        return refined(values, mirrored), 2 * points, cut
+    for _ in range(halvings_of(values, grid)):
         step *= 2
         fine = points >= 2 * MIN_POINTS * (1 - ROUNDING)
         values = coarser(values, 0.0 if fine else MIN_POINTS, mirrored)

@@ -6,18 +6,15 @@ import dataclasses
 from typing import TYPE_CHECKING, ClassVar
 
 from mbma_tables.common.arguments import FloatArray, require_name
-from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
+from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.map_simulation import MIN_POINTS, ROUNDING
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.theories.simulated.grids import FULL, GRIDS, QUICK, steps_along
+from mbma_tables.theories.simulated.grids import FULL, GRIDS, QUICK
 
 if TYPE_CHECKING:
     from mbma_tables.theories.simulated.one_map import BoundaryElements
 
-# of maps that are simulated by default, which then takes seconds
-LEAST_SIDE = 64
-MOST_POINTS = 2**18
+LEAST_SIDE = 64  # of maps that are simulated by default
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,18 +91,16 @@ def is_default(surface: AnySurface) -> bool:
         return False
     try:
         Simulated().of(surface)
-    except (ConvergenceError, OutOfRangeError):
+    except (ConvergenceError, InputError, OutOfRangeError):
         return False
     return True
 
 
 def is_for_simulation(surface: AnySurface) -> bool:
-    """Whether a surface has a map that is resolved and pressed within seconds."""
+    """Whether a surface has a map of enough points, which is pressed within seconds."""
     if not isinstance(surface, MeasuredSurface):
         return False
     treated = surface.map
     if treated is None or surface.bands is None or treated.heights.ndim != 2:
         return False
-    if treated.heights.size > MOST_POINTS or min(treated.heights.shape) < LEAST_SIDE:
-        return False
-    return bool(steps_along(surface, treated) >= MIN_POINTS * (1 - ROUNDING))
+    return bool(min(treated.heights.shape) >= LEAST_SIDE)

@@ -66,6 +66,7 @@ class Plastic(BoundaryElements):
             press,
             theory.origin,
             theory.grid,
+            given=theory.given,
         )
         # yielded share, ln of the frozen stiffness and u less the gap of the mean planes, by ln F
         self._more = PchipInterpolator(
@@ -146,7 +147,7 @@ class Released(BoundaryElements):
         top = float(self.residual_heights.max() - self.residual_heights.mean())
         rows = np.array([force, *rows])
         more = theory.points, press, theory.origin, theory.grid, top
-        super().__init__(theory.surface, rows, *more)
+        super().__init__(theory.surface, rows, *more, given=theory.given)
 
 
 released = shared(KEPT)(Released)

@@ -1,17 +1,21 @@
 """Laws of machined maps, maps from files and spoilt maps, against boundary elements on the maps themselves."""
 
+import dataclasses
+import re
+
 import numpy as np
 import pytest
 from helpers import contact_of, topographies
 from scipy.ndimage import gaussian_filter
 
 from generate.boundary_elements.solve import Contact
-from generate.machined.makers import Part, heights
+from generate.machined.makers import Part, finished, heights, rough
 from generate.pages import maps
 from generate.pages.maps import BARS, ratios, read_rows
 from mbma_tables import Bodies, Scene, Surface, contact, contact_law
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.theories import Calibrated, Simulated, resolve
+from mbma_tables.theories.simulated.grids import GRIDS, QUICK
 from mbma_tables.theories.simulated.own_map import law_loads
 from mbma_tables.theories.simulated.pressing import Press
 
@@ -127,26 +131,46 @@ class TestDefaultTheory:
         assert contact(surface.combined(surface), pressure=0.01).theory == "calibrated"
         assert resolve(None, surface, "separation").name == "mbma"
 
-    def test_small_unresolved_and_large_ones_and_spectra_are_calibrated(self):
-        values = (
-            np.random.default_rng(1).standard_normal((64, 64)),
-            np.tile(heights(Part("milled", 1, 128)), (6, 6)),
-        )
-        others = [
+    def test_small_ones_and_spectra_are_calibrated(self):
+        for surface in (
             self.surface(48),
             Surface.from_spectrum([0.1, 1.0], [1.0, 1e-3], h_max=3.0),
-        ]
-        for surface in others + [
-            Surface.from_map(each, 1.0, periodic=True) for each in values
-        ]:
+        ):
             assert contact(surface, area=0.1).theory == "calibrated"
-        noise = contact(
-            Surface.from_map(0.1 * values[0], 1.0, periodic=True),
-            area=0.1,
-            theory="simulated",
+
+    @pytest.mark.parametrize(
+        ("shortest", "noise", "cutoff"), [(10.0, 0.0, 0.0), (6.0, 0.02, 8.008)]
+    )
+    def test_a_large_map_is_simulated_on_half_of_its_points(
+        self, monkeypatch, shortest, noise, cutoff
+    ):
+        """What the half cannot resolve of a raw map is left out, and told."""
+        few = dataclasses.replace(QUICK, most_points=64 * 64)
+        monkeypatch.setitem(GRIDS, "quick", few)
+        rng = np.random.default_rng(3)
+        values = finished(rough(rng, 128, 64.0, shortest, 0.8), shortest)
+        values = values + noise * values.std() * rng.standard_normal(values.shape)
+        surface = Surface.from_map(values, 1.0, periodic=True)
+        half = contact(surface, area=[0.01, 0.1, 0.5])
+        assert half.theory == "simulated"
+        assert half.valid.all()
+        assert half.elastic_theory.pressed.heights.shape == (64, 64)
+        assert (f"short_cutoff={cutoff}" in half.surface.resolution) == (cutoff > 0)
+        whole = contact(
+            half.surface, pressure=half.pressure, theory=Simulated(grid="full")
         )
-        assert not noise.valid
-        assert any("sampling steps, fewer than 4" in reason for reason in noise.reasons)
+        error = np.abs(np.log(half.area / whole.area))
+        assert (error < 2 * np.hypot(half.area_scatter, whole.area_scatter)).all()
+        flow = half.leakage.x / whole.leakage.x
+        assert np.log(flow[:2]) == pytest.approx(0.0, abs=0.1)
+
+    def test_a_cutoff_that_the_half_cannot_resolve_names_the_full_grid(self, monkeypatch):
+        few = dataclasses.replace(QUICK, most_points=64 * 64)
+        monkeypatch.setitem(GRIDS, "quick", few)
+        found = contact(self.surface(128), area=0.1)
+        assert not found.valid
+        call = re.search(r"theory=(Simulated\(grid='full'\))", str(found.reasons))[1]
+        assert contact(self.surface(128), area=0.1, theory=eval(call)).valid
 
     def test_its_law_with_a_hardness_is_as_accurate_as_its_answers(self):
         wafer = Surface.from_map("docs/data/maps/top-1.top", short_cutoff="9.4 nm")

@@ -1,5 +1,6 @@
 """Simulations that are kept: a table of one's own surface, the cache, and laws in other languages."""
 
+import dataclasses
 import json
 import os
 import pathlib
@@ -16,8 +17,10 @@ from mbma_tables import Scene, Surface, contact, contact_law, sensitivity
 from mbma_tables.common import cache
 from mbma_tables.common.errors import ConvergenceError, InputError, TableFileError
 from mbma_tables.theories import BoundaryElements, Simulated
-from mbma_tables.theories.simulated import boundary_elements, own_map, pressing
+from mbma_tables.theories.simulated import boundary_elements, pressing
 from mbma_tables.theories.simulated.energy_spline import LoadCurve
+from mbma_tables.theories.simulated.grids import FULL as FULL_GRID
+from mbma_tables.theories.simulated.grids import GRIDS
 
 pytest.importorskip("tamaas")
 
@@ -360,9 +363,10 @@ class TestCache:
 class TestLargeMaps:
     @pytest.fixture(autouse=True)
     def few(self, monkeypatch):
-        monkeypatch.setattr(own_map, "MOST_POINTS", 32 * 32)
+        few = dataclasses.replace(FULL_GRID, most_points=32 * 32)
+        monkeypatch.setitem(GRIDS, "full", few)
 
-    def test_finely_sampled_ones_lose_nothing(self):
+    def test_finely_sampled_ones_lose_nothing(self, monkeypatch):
         part = Part(
             "gaussian", 2, 64
         )  # eight sampling steps along the shortest wavelength
@@ -371,7 +375,7 @@ class TestLargeMaps:
         assert own.points == pytest.approx(4.0, rel=0.05)
         found = contact(own.surface, area=0.2, theory=own)
         assert found.valid
-        own_map.MOST_POINTS = 64 * 64
+        monkeypatch.setitem(GRIDS, "full", FULL_GRID)
         full = BoundaryElements.of(own.surface)
         assert found.pressure == pytest.approx(
             contact(own.surface, area=0.2, theory=full).pressure, rel=0.05
