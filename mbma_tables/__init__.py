@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from mbma_tables.contacts.law.law import ContactLaw as ContactLaw
     from mbma_tables.contacts.law.make import contact_law as contact_law
     from mbma_tables.contacts.quantities.interface import Gas as Gas
+    from mbma_tables.contacts.resolution import ResolutionStudy as ResolutionStudy
+    from mbma_tables.contacts.resolution import resolution_study as resolution_study
     from mbma_tables.contacts.result import Contact as Contact
     from mbma_tables.contacts.sealing import sealing_pressure as sealing_pressure
     from mbma_tables.design.functions import contact_function as contact_function
@@ -51,6 +53,7 @@ _HOMES = {
     "Gas": "mbma_tables.contacts.quantities.interface",
     "Island": "mbma_tables.theories.mbma.island",
     "Joint": "mbma_tables.design.joint",
+    "ResolutionStudy": "mbma_tables.contacts.resolution",
     "RoughContact": "mbma_tables.effects.rough_contact",
     "Surface": "mbma_tables.surfaces.surface",
     "ContactLaw": "mbma_tables.contacts.law.law",
@@ -62,6 +65,7 @@ _HOMES = {
     "in_chunks": "mbma_tables.common.chunks",
     "island": "mbma_tables.theories.mbma.island",
     "open_table": "mbma_tables.tables.open",
+    "resolution_study": "mbma_tables.contacts.resolution",
     "rough_contact": "mbma_tables.effects.rough_contact",
     "sealing_pressure": "mbma_tables.contacts.sealing",
     "sensitivity": "mbma_tables.design.sensitivity",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ import numpy as np
 from mbma_tables.cli import options
 from mbma_tables.cli.format import Report, column_unit, columns_of, report_answer, to_json
 from mbma_tables.common.arguments import finite_array
-from mbma_tables.common.errors import InputError
+from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.common.progress import echo
 from mbma_tables.contacts.quantities.registry import unit_of
 from mbma_tables.design.specimen import Specimen
@@ -30,6 +31,18 @@ DRAWN = (
 )  # theories shown beside the chosen one in a picture, where available
 MEASURED = ("h_rms", "h_max", "rms_gradient", "skewness", "kurtosis", "anisotropy")
 ISLAND_FIELDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "X", "mu")
+
+
+def _resolution(pressed: Any) -> list[str]:
+    """A line on what the shortest wavelengths of a simulated map do to its contact, if that can be simulated."""
+    has_map = getattr(pressed.surface, "map", None) is not None
+    if pressed.theory != "simulated" or not has_map or pressed.yields:
+        return []
+    from mbma_tables.contacts.resolution import last_octave
+
+    with contextlib.suppress(MbmaError):
+        return [last_octave(pressed).statement()]
+    return []
 
 
 @click.command(
@@ -78,7 +91,9 @@ def contact_command(
         flow, units_of_flow = _leakage(pressed)
         values |= flow
         units |= units_of_flow
-    report_answer("contact", specimen, model, pressed, values, units).write(output)
+    report = report_answer("contact", specimen, model, pressed, values, units)
+    report.notes.extend(_resolution(pressed))
+    report.write(output)
 
 
 def _leakage(answer: Contact) -> tuple[dict[str, Any], dict[str, str]]:

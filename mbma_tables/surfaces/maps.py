@@ -402,16 +402,17 @@ def measured_surface(
     return surface if shortest is None else extrapolated(surface, shortest, hurst)
 
 
-def without_shorter(surface: S, wavelength: float, why: str) -> S:
+def without_shorter(surface: S, wavelength: float, why: str, chosen: bool = True) -> S:
     """The surface of a map without its wavelengths below one [length].
 
-    `why` says in the provenance what they are left out for.
+    `why` says in the provenance what they are left out for, and `chosen` that nobody asked
+    for it.
     """
     assert surface.map is not None
     treatment = Treatment(short_cutoff=wavelength)
     cut = within(dataclasses.replace(surface.map, provenance=()), treatment)
     (step,) = cut.provenance
-    record = {**step, "chosen": True, "told": f"{step['told']}; {why}"}
+    record = {**step, "chosen": chosen, "told": f"{step['told']}; {why}"}
     less = measured_surface(dataclasses.replace(cut, provenance=(record,)))
     # a highest point that was given stays as it is
     is_own_top = math.isclose(surface.h_max, surface.heights.h_max, rel_tol=1e-9)

@@ -461,7 +461,8 @@ class TestScans:
         np.testing.assert_allclose(added, expected, rtol=1e-3)
         assert (expected > 0.01).all()
         twice, once = (
-            contact(one, area=areas) for one in (average(2 * parts[:1]), parts[0])
+            contact(one, area=areas, theory="calibrated")
+            for one in (average(2 * parts[:1]), parts[0])
         )
         for name in names:
             np.testing.assert_allclose(

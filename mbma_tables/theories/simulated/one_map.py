@@ -170,7 +170,7 @@ class BoundaryElements(Theory):
         ).hexdigest()[:16]
         own = f"of the map of {' x '.join(map(str, whole.heights.shape))} points with SHA-256 {digest}"
         origin = f"boundary elements, tolerance {chosen.tolerance:g}, {own}"
-        rows = np.array([force, *rows])
+        rows = _rising(np.array([force, *rows]), chosen.tested[0])
         return cls(simulated, rows, points, press, origin, chosen, given=surface)
 
     def to_netcdf(self, path: os.PathLike[str] | str) -> None:
@@ -479,6 +479,15 @@ class BoundaryElements(Theory):
         self, surface: AnySurface, quantity: str = "pressure"
     ) -> tuple[FloatArray, FloatArray]:
         return np.zeros(()), np.asarray(self.fit.top)
+
+
+def _rising(rows: FloatArray, lightest: float) -> FloatArray:
+    """Loads without those of a few touching elements, lighter than any tested, whose area exceeds the next one's."""
+    while True:
+        falls = (np.diff(rows[1]) < 0) & (rows[1, :-1] < lightest)
+        if not falls.any():
+            return rows
+        rows = np.delete(rows, int(np.argmax(falls)), axis=1)
 
 
 @shared(8)

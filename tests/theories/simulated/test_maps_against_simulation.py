@@ -52,8 +52,10 @@ def test_other_maps_are_not_and_say_what_helps(family, number, statistic):
     coarse = Surface.from_map(
         surface_of(family, number).map.heights[::2, ::2], 2.0, periodic=True
     )
-    remedy = "contact(Surface.from_map(..., short_cutoff=8.008), ..., theory='simulated')"
+    remedy = "contact(surface, ..., theory='simulated') simulates the map"
     assert any(remedy in text for text in coarse.departures(by_map=True))
+    named = "short_cutoff=8.008"
+    assert named in contact(coarse, area=0.1, theory="simulated").surface.resolution
     assert (found.scatter > 0.13).all()
     assert (found.area_scatter > 0.07).all()
     assert (found.stiffness_scatter > 0.2).all()
