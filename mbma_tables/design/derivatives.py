@@ -332,7 +332,7 @@ def _add_ratio(
         """The ratios of stiffnesses at both ends."""
         direction = body.interface.direction
         return [
-            ratio_on(described.surface, bodies.bodies, direction, pressed.area)
+            ratio_on(pressed.surface, bodies.bodies, direction, pressed.area)
             for bodies in both_ends(name)
         ]
 

@@ -1022,7 +1022,8 @@ class Joint(JointQuantities, Displayed):
 
     def _kappa(self, area: Any) -> Any:
         """Normal over tangential stiffness at a contact area, which only matters to surfaces with a lay."""
-        return ratio_on(self.surface, self.bodies, self.direction, area)
+        simulated = resolve(self.theory, self.surface).surface_of(self.surface)
+        return ratio_on(simulated, self.bodies, self.direction, area)
 
     def table(self, pressures: ArrayLike | Sequence[str]) -> xr.Dataset:
         """Every quantity of the joint at pressures, as an xarray Dataset with units and model uncertainties.
