@@ -31,10 +31,10 @@ MOST_HALVINGS = (
     36  # of an axis; where the function is still no polynomial, it is not smooth
 )
 MOST_TRIALS = 3  # of terms in one box
-AIM = 0.4  # of the target, for the tests of a box
+AIM = 0.8  # of the target, for the tests of a box
 BOUND = 2.0  # bound over the largest error at the tests of a box
 LEAST_BOUND = 0.05  # of the target
-TRIMMED = 0.05  # of the target, what terms that are left out may add up to
+TRIMMED = 0.2  # of the target, what terms that are left out may add up to
 SLOWEST = 0.98  # ratio of one term to the one before, for estimates of what is left out
 MOST_ROUNDS = 8  # of held-out points
 REPLAYED = 16  # held-out points of a piece that a file keeps
