@@ -51,6 +51,8 @@ PAGES = {
     "gallery": "pages.maps:gallery",
     "machined": "pages.maps:machined",
     "maps": "pages.maps:maps",
+    "measured": "pages.measurements:measurements",
+    "metals": "pages.measurements:metals",
     "data": "pages.simulations:data",
     "fidelity": "pages.simulations:fidelity",
     "joints": "pages.simulations:joints",

@@ -62,6 +62,7 @@ from mbma_tables.theories.simulated.map_gaps import OPEN_SHARES
 TEXTS = tomllib.loads(
     pathlib.Path(__file__).with_name("variables.toml").read_text(encoding="utf-8")
 )
+FEWEST = 4  # loads of a surface from which on its stiffness is found
 DIMENSIONS = (
     *("surface", "load", "quantile", "top", "band", "band_or_end", "axis"),
     *("share_open", "range"),
@@ -154,12 +155,14 @@ def collected(name: str, found: Sequence[dict[str, Any]], kind: str) -> xr.Varia
 
 
 def stiffness(data: xr.Dataset) -> FloatArray:
-    """-dF/du of every surface by a spline; NaN without a gap."""
+    """-dF/du of every surface by a spline; NaN without a gap, and of few loads."""
     found = np.full(data.force.shape, np.nan, "f4")
     for row, force, u in zip(
         found, data.force.values, data.mean_separation.values, strict=True
     ):
         known = u > 0
+        if np.count_nonzero(known) < FEWEST:
+            continue
         log_u = CubicSpline(np.log(force[known]), np.log(u[known]))
         row[known] = -force[known] / (u[known] * log_u.derivative()(np.log(force[known])))
     return found

@@ -23,7 +23,15 @@ from generate.files import ROOT, dataset
 from generate.machined import studies
 from generate.page import Cell, Measured, Picture, panels, percent, table
 from generate.rough_spheres import RADIUS, heights
-from mbma_tables import Contact, Joint, Surface, flow_factors, rough_contact
+from mbma_tables import (
+    Bodies,
+    Contact,
+    Joint,
+    Surface,
+    contact,
+    flow_factors,
+    rough_contact,
+)
 from mbma_tables.bodies.bodies import mean_conductivity
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.contacts.quantities.conductances import cooper_mikic_yovanovich
@@ -36,6 +44,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+WIDE = ROOT / "docs/data/bandwidth.nc"
 PAIRS = {
     "steel on aluminium": ("steel 4140 hard", "aluminium 6061 hard"),
     "copper on copper": "copper C11000 hard",
@@ -543,11 +552,41 @@ def _draw_deviation(
         ax.fill_between(middle, lower, upper, color=hue, alpha=0.15, lw=0)
 
 
+def wide_bands(data: xr.Dataset) -> str:
+    """A table of the calibrated law's errors at wavelengths beyond 1:128, with its scatter."""
+    lines = [
+        "| H | longest/shortest | A/A0 | area | ln p |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    elastic = Bodies(1.0, hardness=np.inf)
+    for number in range(data.sizes["surface"]):
+        one = data.isel(surface=number)
+        solved = np.isfinite(one.force.values)
+        area = one.area.values[solved].astype(float)
+        u = one.mean_separation.values[solved].astype(float)
+        hurst, zeta_1 = float(one.hurst), float(one.zeta_1)
+        face = Surface(hurst, 1e-3, 1e-3 * zeta_1, 1.0, float(one.h_max))
+        pressure = one.force.values[solved] * float(face.rms_gradient)
+        pressed = contact(face, elastic, pressure=pressure, theory="calibrated")
+        at_gap = contact(face, elastic, mean_separation=u, theory="calibrated")
+        of_area = 100 * np.log(pressed.area / area)
+        spread = 100 * np.asarray(pressed.area_scatter), np.asarray(at_gap.scatter)
+        of_pressure = np.log(at_gap.pressure / pressure)
+        for k, share in enumerate(area):
+            lines.append(
+                f"| {hurst:g} | {zeta_1:g} | {share:.3f} | {of_area[k]:+.1f}% "
+                f"({spread[0][k]:.1f}%) | {of_pressure[k]:+.2f} "
+                f"({spread[1][k]:.2f}) |"
+            )
+    return "\n".join(lines)
+
+
 def fidelity() -> Measured:
     of_others = distances.theories_of(distances.OTHERS)
     parts = {
         "summary": summary_table(distances.data_sets().values()),
         "scores": distances.scores(distances.THEORIES | of_others),
+        "bandwidth": wide_bands(xr.load_dataset(WIDE, group="bandwidth")),
     }
     return parts, {"docs/figures/fidelity.svg": by_contact()}
 

@@ -33,7 +33,7 @@ from mbma_tables.common.arguments import (
 )
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import shipped_file
-from mbma_tables.common.units import Units, factor, in_one_unit
+from mbma_tables.common.units import Units, factor, in_one_unit, read
 
 # plasticity index E* g/p_m up to which elastic areas are within 5% of those with a hardness
 ELASTIC_PSI = 1.1
@@ -74,6 +74,10 @@ _SCALE = re.compile(
     r"\s*([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?)\s*(HV|HRC|HRB|HBW?)\s*"
     r"(?:([0-9]+\.?[0-9]*)/([0-9]+\.?[0-9]*))?[0-9./]*\s*"
 )
+# mean pressure of an indentation over the yield stress of a metal that does not harden
+# (Tabor 1951); 2.8 in others' books
+OVER_YIELD = 3.0
+_YIELD = re.compile(r"\s*(?:([0-9.]+)\s*(?:x|\*)\s*)?yield\s+(\S.*?)\s*", re.IGNORECASE)
 # ranges of metals' constants: numbers outside are in another unit
 MODULI = (0.01, 2000.0)
 HARDNESSES = (1e-4, 150.0)
@@ -469,9 +473,10 @@ def hardness(given: str) -> str:
         differ by up to 6%). A Brinell number, "200 HB" or "200 HBW": force over the cap of
         the indentation, from 96 to 653 at 3000 kgf and a ball of 10 mm; with other balls
         and loads [mm/kgf] after it, "95 HBW 10/500". A metal by name, with its temper where
-        these differ by more than a factor of 1.3, "aluminium 6061 hard"; or a pressure,
-        "1.5 GPa", which of a metal that does not harden is three times its yield stress
-        (Tabor 1951).
+        these differ by more than a factor of 1.3, "aluminium 6061 hard"; a pressure,
+        "1.5 GPa"; or the yield stress of a metal that does not harden, "yield 350 MPa", of
+        which three times is taken (Tabor 1951), or another factor, "2.8 x yield 350 MPa". Of
+        one that hardens the yield stress after 8% strain counts.
 
     Raises
     ------
@@ -488,6 +493,18 @@ def hardness(given: str) -> str:
     ('2.03604 GPa', '0.95 GPa')
     """
     text = str(given)
+    if match := _YIELD.fullmatch(text):
+        share = OVER_YIELD if match[1] is None else _number(match[1])
+        require(
+            "factor of the yield stress",
+            np.asarray(share),
+            1 <= share <= 4,
+            "from 1 to 4",
+        )
+        if read("hardness", match[2])[1] is None:
+            raise InputError(f"a yield stress has a unit, 'yield 350 MPa', got {text!r}")
+        stress = Units(stress="GPa").number("hardness", match[2])
+        return f"{share * float(positive_array('yield stress', stress)):.6g} GPa"
     if match := _SCALE.fullmatch(text):
         return f"{_pressure_of_number(float(match[1]), match[2], match[3], match[4]):.6g} GPa"
     # a name such as 6061-T6 begins with a digit; 1.4301 alone is a number here
@@ -510,6 +527,15 @@ def hardness(given: str) -> str:
             )
         return pressure
     return text
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(
+            f"the factor of a yield stress is a number, got {text!r}"
+        ) from None
 
 
 def _pressure_of_number(

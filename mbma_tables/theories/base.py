@@ -291,7 +291,9 @@ class Theory(abc.ABC):
         self, surface: AnySurface, answer: TheoryAnswer, mean_separation: FloatArray
     ) -> Mapping[str, NDArray[np.bool_]]:
         """Reasons why results lie outside the tested range of the theory, each with a mask."""
-        reasons = tested.untested(surface, answer.area, self.by_heights(surface))
+        by_heights = self.by_heights(surface)
+        name = self.scatter_name(surface)
+        reasons = tested.untested(surface, answer.area, by_heights, name)
         if self.ends_at_h_max:
             return reasons
         beyond = mean_separation > np.asarray(surface.h_max)
@@ -317,7 +319,8 @@ class Theory(abc.ABC):
             self.scatter_name(surface), quantity, area
         )
         scatter = np.broadcast_to(scatter, shape)
-        return np.where(tested.is_compared(surface), scatter, np.nan)
+        compared = tested.is_compared(surface, self.scatter_name(surface))
+        return np.where(compared, scatter, np.nan)
 
     def law_curves(self, surface: AnySurface, rtol: float) -> Compression | None:
         """Curves for the law of one surface to a relative error; None: it is fitted to answers."""

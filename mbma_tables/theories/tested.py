@@ -42,9 +42,9 @@ def _rows() -> dict[tuple[str, str], dict[str, Range]]:
     return rows
 
 
-def elastic_ranges() -> Mapping[str, Range]:
-    """Tested ranges of elastic contacts, which are those of all theories but the ones of maps."""
-    return _rows()["any", "elastic"]
+def elastic_ranges(theory: str = "") -> Mapping[str, Range]:
+    """Tested ranges of elastic contacts: of all theories but the ones of maps, or with those of one beyond."""
+    return {**_rows()["any", "elastic"], **_rows().get((theory, "elastic"), {})}
 
 
 def ranges_with_hardness(theory: str) -> Mapping[str, Range]:
@@ -63,13 +63,15 @@ def above(values: Any, limits: Range) -> Any:
 
 
 def untested(
-    surface: AnySurface, area: FloatArray, by_heights: bool = False
+    surface: AnySurface, area: FloatArray, by_heights: bool = False, theory: str = ""
 ) -> dict[str, Any]:
     """Reasons why contacts of these areas A/A0 are outside the simulated range, each with a mask.
 
-    `by_heights` is of theories that know all heights of a map.
+    `by_heights` is of theories that know all heights of a map, `theory` the name of one
+    whose scatter is stored under it.
     """
-    reasons = {**_of_the_surface(surface, by_heights), **_of_the_side(surface)}
+    own = _of_the_surface(surface, by_heights, theory)
+    reasons = {**own, **_of_the_side(surface)}
     reasons |= untested_areas(area, elastic_ranges()["area"])
     return {text: np.broadcast_to(mask, np.shape(area)) for text, mask in reasons.items()}
 
@@ -103,6 +105,10 @@ def untested_with_hardness(
     reasons = {soft: below(eta, ranges["eta"])}
     if "area" in ranges:
         reasons |= untested_areas(area, ranges["area"], ", with a hardness")
+    if "bandwidth" in ranges:
+        most = ranges["bandwidth"][1]
+        text = f"the longest wavelength is more than {most:g} times the shortest, with a hardness"
+        reasons[text] = above(bandwidth(surface), ranges["bandwidth"])
     if "heights" in ranges:
         low, high = ranges["heights"]
         heights = np.asarray(surface.h_max) / np.asarray(surface.h_rms)
@@ -114,15 +120,21 @@ def untested_with_hardness(
     return {text: np.broadcast_to(mask, shape) & yields for text, mask in reasons.items()}
 
 
-def is_compared(surface: AnySurface) -> FloatArray:
+def is_compared(surface: AnySurface, theory: str = "") -> FloatArray:
     """Mask of surfaces like those whose deviations from simulations are averaged in the scatter."""
-    ranges = elastic_ranges()
+    ranges = elastic_ranges(theory)
     ratio = bandwidth(surface)
-    broad = above(ratio, (0.0, BROADEST))
+    broad = above(ratio, (0.0, max(BROADEST, ranges["bandwidth"][1])))
     if isinstance(surface, MeasuredSurface | BandedSurface):
         return np.asarray(~broad)
     low_hurst = below(getattr(surface, "hurst", 1.0), ranges["hurst"])
     return np.asarray(~(broad | below(ratio, ranges["bandwidth"]) | low_hurst))
+
+
+def beyond_all(surface: AnySurface) -> FloatArray:
+    """Doublings of the bandwidth beyond that up to which all theories were compared."""
+    most = elastic_ranges()["bandwidth"][1]
+    return np.asarray(np.log2(np.maximum(bandwidth(surface) / most, 1.0)))
 
 
 def bandwidth(surface: AnySurface) -> Any:
@@ -152,8 +164,8 @@ def _has_low_hurst(surface: AnySurface, limits: Range) -> Any:
     return (ratio > 1) & (np.asarray(steepness) > steepest * (1 + ROUNDING))
 
 
-def _of_the_surface(surface: AnySurface, by_heights: bool) -> dict[str, Any]:
-    ranges = elastic_ranges()
+def _of_the_surface(surface: AnySurface, by_heights: bool, theory: str) -> dict[str, Any]:
+    ranges = elastic_ranges(theory)
     ratio = bandwidth(surface)
     least, most = ranges["bandwidth"]
     narrow = f"the longest wavelength is less than {least:g} times the shortest"

@@ -1,5 +1,7 @@
+import csv
 import dataclasses
 import json
+import pathlib
 
 import numpy as np
 import pytest
@@ -18,7 +20,7 @@ from mbma_tables import (
     materials,
     sensitivity,
 )
-from mbma_tables.bodies.materials import effective_modulus
+from mbma_tables.bodies.materials import effective_modulus, hardness
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.export.rows.law_rows import describe_law
 
@@ -260,6 +262,26 @@ def test_constants_of_a_metal_in_units_and_in_the_wrong_ones():
         materials.pair({"name": "S", "E": 210, "nu": 0.3, "conductivity": 45, "Young": 5})
 
 
+def test_hardness_is_three_times_the_yield_stress_or_another_factor():
+    assert hardness("yield 350 MPa") == "1.05 GPa"
+    assert hardness("2.8 x Yield 0.25 GPa") == "0.7 GPa"
+    by_yield, by_pressure = (
+        contact(FACE, Bodies("100 GPa", hardness=given), pressure="100 MPa")
+        for given in ("yield 350 MPa", "1050 MPa")
+    )
+    assert by_yield.area == by_pressure.area
+
+
+def test_every_name_of_a_metal_is_on_its_page():
+    page = pathlib.Path("docs/metals.md").read_text(encoding="utf-8")
+    lines = pathlib.Path("tables/metals.csv").read_text(encoding="utf-8").splitlines()
+    for row in csv.DictReader(line for line in lines if not line.startswith("#")):
+        assert f"| {row['name']} | " in page
+        for name in row["also"].split(";"):
+            assert name in page
+        assert row["source"] in page
+
+
 def test_hardnesses_that_are_refused():
     for text, message in (
         ("aluminium 6061", r"'aluminium 6061 soft' \(0.31 GPa\)"),
@@ -268,6 +290,10 @@ def test_hardnesses_that_are_refused():
         ("unobtainium", "no metal is named"),
         ("0 HV", "positive"),
         ("3 um", "unit of stress"),
+        ("yield 350", "a yield stress has a unit"),
+        ("9 x yield 350 MPa", "factor of the yield stress must be from 1 to 4"),
+        ("1.2.3 x yield 350 MPa", "is a number"),
+        ("yield -3 MPa", "yield stress must be positive"),
     ):
         with pytest.raises(InputError, match=message):
             contact(FACE, Bodies("100 GPa", hardness=text), pressure="1 MPa")

@@ -107,11 +107,11 @@ function cubic(p, q, y) {
 }
 
 // Reasons why the surface is outside the simulated range, as `theories/tested.py` has them.
-function untestedSurface(state, h_rms) {
+function untestedSurface(state, h_rms, theory) {
   if (state.samples) return [];
   const ratio = state.h_max / h_rms,
     zeta_1 = state.q1 / state.q0,
-    [narrow, broad] = LIMITS.zeta_1,
+    [narrow, broad] = LIMITS.zeta_1[theory],
     [flat, high_peaks] = LIMITS.heights;
   return [
     [`the Hurst exponent is below ${LIMITS.hurst}`, state.hurst < LIMITS.hurst * (1 - 1e-9)],
@@ -128,10 +128,14 @@ function scatterOf(state, curve) {
     nodes = LIMITS.log_area,
     [lightest, heaviest] = LIMITS.compared,
     zeta_1 = state.q1 / state.q0,
+    [narrow, broad] = LIMITS.zeta_1[other ? `mbma_${state.variant}` : curve.theory],
     alike =
       state.hurst >= LIMITS.hurst * (1 - 1e-9) &&
-      zeta_1 >= LIMITS.zeta_1[0] * (1 - 1e-9) &&
-      zeta_1 <= LIMITS.broadest * (1 + 1e-9);
+      zeta_1 >= narrow * (1 - 1e-9) &&
+      zeta_1 <= Math.max(broad, LIMITS.broadest) * (1 + 1e-9),
+    // beyond the bandwidth of all theories, as `Calibrated.scatter` has it
+    doublings = state.samples ? 0 : Math.log2(Math.max(zeta_1 / LIMITS.zeta_1.persson[1], 1)),
+    wide = LIMITS.wide_scatter[curve.theory] ?? {};
   const at = (quantity) => (area) => {
     const row = rows[quantity].map((value, k) => [nodes[k], value]).filter(([, value]) => value !== null);
     if ((!state.samples && !alike) || area === null || !row.length || area < lightest || area > heaviest) return null;
@@ -142,7 +146,11 @@ function scatterOf(state, curve) {
     const [[x0, y0], [x1, y1]] = [row[above - 1], row[above]];
     return Math.exp(y0 + ((y1 - y0) * (x - x0)) / (x1 - x0));
   };
-  const known = Number.isFinite(state.hardness) ? () => () => null : at; // with a hardness the library has it
+  const widened = (quantity) => (area) => {
+    const stated = at(quantity)(area);
+    return stated === null ? null : Math.hypot(stated, (wide[quantity] ?? 0) * Math.sqrt(doublings));
+  };
+  const known = Number.isFinite(state.hardness) ? () => () => null : widened; // with a hardness the library has it
   return Object.fromEntries(["pressure", "area", "stiffness"].map((name) => [name, curve.area.map(known(name))]));
 }
 
@@ -170,7 +178,7 @@ function concernsOf(state, curve, h_rms, gradient) {
   } else if (curve.theory === "persson") {
     reasons.push(["u is above h_max, where the surface has no contact", (k) => curve.mean_separation[k] > state.h_max]);
   }
-  untestedSurface(state, h_rms).forEach(([text, holds]) => reasons.push([text, always(holds)]));
+  untestedSurface(state, h_rms, curve.theory).forEach(([text, holds]) => reasons.push([text, always(holds)]));
   reasons.push([`A/A0 is below ${low}`, (k) => curve.area[k] > 0 && curve.area[k] < low]);
   reasons.push([`A/A0 is above ${high}`, (k) => curve.area[k] > high]);
   return reasons;

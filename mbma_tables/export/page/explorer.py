@@ -28,6 +28,7 @@ from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.tables.open import universal_model
 from mbma_tables.theories import default_name, tested
+from mbma_tables.theories.calibrated.theory import WIDE_SCATTER
 from mbma_tables.theories.evidence import COMPARED, QUANTITIES, shipped_deviations
 from mbma_tables.theories.mbma import theory as mbma
 from mbma_tables.theories.named import OF_MAPS, options_of
@@ -87,7 +88,10 @@ def _limits() -> dict[str, Any]:
         "gradient": MAX_GRADIENT,
         "mbma_area": mbma.MAX_AREA,
         "hurst": ranges["hurst"][0],
-        "zeta_1": ranges["bandwidth"],
+        "zeta_1": {
+            name: tested.elastic_ranges(name)["bandwidth"] for name in deviations.log_rms
+        },
+        "wide_scatter": {"calibrated": WIDE_SCATTER},
         "broadest": tested.BROADEST,
         "heights": ranges["heights"],
         "compared": COMPARED,

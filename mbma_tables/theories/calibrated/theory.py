@@ -52,6 +52,10 @@ MAP_SCATTER = {
     "pressure": (0.029, 0.18),
     "stiffness": (0.056, 0.23),
 }
+# standard deviations added to those of spectra for the first doubling of the bandwidth beyond
+# that of the data that the law was fitted to, and times its root for more doublings: the
+# errors of a few surfaces with two longest waves a side (docs/fidelity.md)
+WIDE_SCATTER = {"area": 0.01, "pressure": 0.05, "stiffness": 0.08}
 LIKE_SCANS = 1e-3, 0.9  # A/A0 at which scans are compared
 MANY = 1000  # entries for which polynomials of one surface are made
 ROUNDING = 1e-14  # rounding of a separation beside h_max
@@ -354,7 +358,9 @@ class Calibrated(Theory):
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Scatter as of any theory; for maps with an addition to that of Gaussian ones."""
         if not self.by_heights(surface):
-            return super().scatter(surface, quantity, area)
+            stated = super().scatter(surface, quantity, area)
+            doublings = tested.beyond_all(surface)
+            return np.hypot(stated, WIDE_SCATTER.get(quantity, 0.0) * doublings**0.5)
         assert isinstance(surface, MeasuredSurface)
         if surface.outside(PRESSED):
             return np.full(np.shape(area), np.nan)

@@ -157,7 +157,7 @@ class TestAnswers:
         assert contact(
             gentle, area=[0.0005, 0.02, 0.98], theory="calibrated"
         ).valid.tolist() == [False, True, False]
-        broad = Surface(0.8, 0.01, 1.29, 1.0, 3.3)
+        broad = Surface(0.8, 0.01, 5.13, 1.0, 3.3)
         assert not contact(broad.combined(broad), area=0.02).valid
         assert contact(gentle.combined(gentle), area=0.02).valid
 
