@@ -139,6 +139,8 @@ class Theory(abc.ABC):
     ends_at_h_max = True
     # whether it goes by the heights of a map, where a surface has them, and not by a spectrum
     takes_heights = False
+    # whether flow through its contacts was compared with simulations that yield
+    has_yielded_flow = False
     # whether it simulates a map, and can do so anew with a hardness
     presses_anew = False
 

@@ -221,6 +221,7 @@ class Calibrated(Theory):
 
     name = "calibrated"
     takes_heights = True
+    has_yielded_flow = True
 
     def interval(
         self, surface: AnySurface, quantity: str = "pressure"
