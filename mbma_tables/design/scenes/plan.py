@@ -16,7 +16,7 @@ import dataclasses
 import functools
 import math
 import pathlib
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,9 +26,6 @@ from mbma_tables.contacts.question import both_separations
 from mbma_tables.islands.island_models import AnyModel
 from mbma_tables.tables.island4d import Island4dModel
 from mbma_tables.tables.universal import UniversalModel
-
-if TYPE_CHECKING:
-    from mbma_tables.design.scenes.scene import Scene
 
 TABLES = ("universal", "island4d")  # island models that are tables
 LEAKAGE = "leakage"  # of `Contact.leakage`: several quantities under one name
@@ -252,7 +249,7 @@ def duration(seconds: float) -> str:
     return f"{seconds / 1e-6:.3g} us"
 
 
-def make_plan(scene: Scene) -> Plan:
+def make_plan(scene: Any) -> Plan:
     """The steps that meet the tolerance, or the tightest of `LADDER` that fit the time budget."""
     if scene.rtol is not None:
         return _Planner(scene, scene.rtol).plan()
@@ -303,7 +300,7 @@ def certified_error(island_model: str | AnyModel, rtol: float) -> float:
 class _Planner:
     """The plan of one scene at one tolerance."""
 
-    scene: Scene
+    scene: Any  # a `Scene`, whose module imports this one
     rtol: float
     costs: Costs = dataclasses.field(default_factory=shipped_costs)
 

@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from mbma_tables.contacts.result import Contact
-    from mbma_tables.design.scenes.scene import Scene
     from mbma_tables.theories.mbma.profile import Shape
 
 
@@ -74,7 +73,7 @@ COORDINATES = (
 class Run:
     """A plan in execution: values passed between steps, and results."""
 
-    scene: Scene
+    scene: Any  # a `Scene`, whose module imports this one
     surface: AnySurface
     gap: Any = None  # separations d
     # dimensions, values, unit and meaning by name
@@ -373,7 +372,7 @@ def comparison(run: Run, step: Step) -> None:
         run.keep(f"{step.name}_{name}", values, meaning=meaning, same=name)
 
 
-def run_plan(scene: Scene, plan: Plan) -> xr.Dataset:
+def run_plan(scene: Any, plan: Plan) -> xr.Dataset:
     """The quantities of a scene with units and provenance.
 
     Raises
