@@ -36,7 +36,7 @@ ISLAND_FIELDS = ("zeta_d", "zeta_u", "R_d", "R_u", "D", "sigma", "h_d", "eta", "
 def _resolution(pressed: Any) -> list[str]:
     """A line on what the shortest wavelengths of a simulated map do to its contact, if that can be simulated."""
     has_map = getattr(pressed.surface, "map", None) is not None
-    if pressed.theory != "simulated" or not has_map or pressed.yields:
+    if not has_map or pressed.yields:
         return []
     from mbma_tables.contacts.resolution import last_octave
 

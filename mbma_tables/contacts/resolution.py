@@ -200,6 +200,8 @@ def last_octave(found: Contact) -> ResolutionStudy:
     """The study of a simulated contact at its own pressures, and without its last octave of wavelengths."""
     surface: Any = found.surface
     map_of(surface)
+    if found.theory_of(found.bodies).gaps() is None:
+        raise InputError(f"a contact by {found.theory!r} has no simulated gaps")
     shortest = surface.shortest(NO_POWER)
     longer = without_shorter(surface, 2 * shortest, WHY, chosen=False)
     asked = {"pressure": found.pressure}

@@ -18,6 +18,7 @@ from scipy.special import ndtr, ndtri
 
 from mbma_tables.common.arguments import FloatArray, answered
 from mbma_tables.common.errors import InputError
+from mbma_tables.common.shared import frozen
 from mbma_tables.core import core
 from mbma_tables.surfaces.bearing_curve import FRACTIONS
 
@@ -50,7 +51,7 @@ CONSTANTS = Constants()
 @functools.cache
 def _numbers(constants: Constants) -> FloatArray:
     """The constants as the core takes them, `mbma_hardness_law` of mbma.h."""
-    return np.array(dataclasses.astuple(constants))
+    return frozen(np.array(dataclasses.astuple(constants)))
 
 
 def area(
