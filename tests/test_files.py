@@ -59,6 +59,8 @@ def test_a_step_that_fails_leaves_the_old_file(
 
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning")
+# other tests may have imported jax, which warns of every fork
+@pytest.mark.filterwarnings("ignore:os.fork:RuntimeWarning")
 def test_a_process_killed_before_the_rename_leaves_the_old_file(old):
     child = os.fork()
     if child == 0:

@@ -220,10 +220,6 @@ def test_a_file_may_call_for_it():
 test_what_contradicts = refusals(
     lambda more: Scene(**PRESSED, **more),
     (
-        {"quantities": ["energy"], "bodies": Bodies(hardness=50.0)},
-        "energy needs an elastic contact",
-    ),
-    (
         {"bodies": Bodies(hardness=50.0), "without": ["finite_height"]},
         "without: of elastic contacts",
     ),

@@ -19,7 +19,14 @@ from mbma_tables import InputError, OutOfRangeError, TableFileError, open_table
 from mbma_tables.cli import main
 from mbma_tables.common.workers import crew
 from mbma_tables.tables import make_function
-from mbma_tables.tables.boxes import MOST_HALVINGS, Aim, Box, Piece, UnreachedError
+from mbma_tables.tables.boxes import (
+    MOST_HALVINGS,
+    TRIMMED,
+    Aim,
+    Box,
+    Piece,
+    UnreachedError,
+)
 from mbma_tables.tables.make_function import make, merge, verified_errors, wanted_of
 
 UNIT = {"low": 0.0, "high": 1.0}
@@ -578,13 +585,15 @@ def test_folders_of_others_and_damaged_pieces_are_refused(tmp_path):
     st.integers(1, 6),
 )
 def test_polynomials_are_tabulated_exactly(factors, width, seed):
-    """A cubic in two numbers, by pieces alone, without files."""
+    """A cubic in two numbers, but for terms that the target leaves out; by pieces alone, without files."""
     a, b, c = factors
     piece = a_piece(2, width, 1e-9, seed)
     while not piece.is_done:
         x, y = piece.points().T
         piece.take((a * x**3 + b * x * y * y + c)[:, None])
-    assert np.nanmax(piece.errors) < 1e-12
+    largest = max(map(abs, factors))
+    left_out = TRIMMED * 1e-9 if largest < 1e-3 else 1e-12
+    assert np.nanmax(piece.errors) < left_out
     assert len(piece.boxes) == 1
 
 
