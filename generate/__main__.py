@@ -34,6 +34,7 @@ COMMANDS = {
     "rough_spheres": "generate.rough_spheres",
     "score": "generate.distances",
     "tables": "generate.tables",
+    "unloaded_flow": "generate.unloaded_flow",
     "unloading": "generate.unloading",
 }
 

@@ -4,6 +4,7 @@ import pathlib
 import pickle
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from helpers import contact_of, fresh, random_map
@@ -11,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from generate.files import dataset
+from generate.unloaded_flow import errors
 from mbma_tables import Bodies, Surface, contact, contact_law
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.contacts.quantities import effective_medium as leakage
@@ -419,6 +421,35 @@ def test_flow_through_yielded_contacts_is_that_of_simulations():
     within = np.abs(error / stated)[np.array(valid)]
     assert (within < 1).mean() > 0.6
     assert (within < 2).mean() > 0.9
+
+
+def test_contacts_leak_after_unloading_as_boundary_elements_say():
+    data = pd.read_csv(REFERENCE.with_name("unloaded_flow.csv"))
+    found = errors(data[data.held_out == 1])
+    assert not found.is_blocked.any()
+    light = found[(found.area < 0.2)]
+    assert len(light) > 100
+    assert np.sqrt(np.mean(light.error**2)) < 0.15
+    tested = found[found.is_valid]
+    assert len(tested) > 100
+    assert np.mean(np.abs(tested.standardised) < 2) > 0.92
+
+
+def test_flow_goes_back_to_that_of_loading_at_the_largest_pressure():
+    face = Surface(0.8, 0.02, 0.24, 1.0, 3.5)
+    bodies = Bodies(1.0, hardness=0.2 * float(face.rms_gradient))
+    top = contact(face, bodies, area=0.15, theory="calibrated")
+    after = {"largest_pressure": float(top.pressure), "theory": "calibrated"}
+    pressures = float(top.pressure) * np.array([0.1, 0.5, 1 - 1e-9, 1.0])
+    leak = contact(face, bodies, pressure=pressures, **after).leakage
+    assert (np.diff(leak.K) < 0).all()
+    np.testing.assert_allclose(leak.K[2:], top.leakage.K, rtol=1e-6)
+    law = contact_law(face, bodies, **after)
+    np.testing.assert_allclose(law.leakage(pressure=pressures), leak.K, rtol=1e-4)
+    assert leak.valid.all()
+    lighter = contact(face, bodies, pressure=0.04 * pressures[3], **after).leakage
+    assert not lighter.valid
+    assert any("from 0.05 of the largest" in reason for reason in lighter.reasons)
 
 
 @pytest.mark.parametrize("area", [0.05, 0.6])

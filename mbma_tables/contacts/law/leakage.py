@@ -18,7 +18,7 @@ from mbma_tables.contacts.quantities.leakage import (
     along,
     area_of_flow,
     degrees,
-    flow,
+    flow_of_contact,
     shipped_flow,
     unknown_where_blocked,
     yields_noticeably,
@@ -143,7 +143,8 @@ def leakage_law(
     def coefficient(d: FloatArray) -> FloatArray:
         u = (law.h_max + d) / 2
         if law.gaps is None:
-            return h_rms**3 * flow(surface, u, obstructing(d))
+            area = np.asarray(law.area(separation=d))
+            return h_rms**3 * flow_of_contact(theory, surface, u, area)
         x, y, xy = law.gaps.flow(surface, u)
         return np.asarray(
             np.sqrt(x * y) if direction is None else along(direction, x, y, xy)

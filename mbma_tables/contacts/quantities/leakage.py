@@ -86,6 +86,13 @@ SIMULATED = 64.0  # zeta_1 up to which flow was simulated
 # yielded share of the contact up to which its flow is that of the elastic contact: gap and
 # area differ by less than this share, the scatter of flow is at least forty times as large
 NEGLIGIBLE_YIELD = 1e-3
+# growth of the hydraulic aperture over that of the mean gap on unloading, and p_m/(E* g),
+# zeta_1 and shares of the largest pressure at which it was simulated, by `python -m generate
+# unloaded_flow`
+OPENING = 1.1
+UNLOADED_ETA = (0.03, 0.5)
+UNLOADED_TO = 16.0
+LEAST_RATIO = 0.05
 MEANINGS = {
     "K": "flow coefficient",
     "x": "flow coefficient along the first axis",
@@ -185,6 +192,7 @@ class Leakage(Displayed):
             simulated = _simulated(by)
             if simulated is not None:
                 return (simulated.flow_trust(surface, u, area)[0],)
+            area = largest_area(by, surface, u, area)
             stated = shipped_flow().standard_deviation(by.elastic.name, area)
             if not isinstance(surface, MeasuredSurface) or surface.bearing is None:
                 return (stated,)
@@ -370,8 +378,7 @@ def leakage_of(contact: Any) -> Leakage:
             if simulated is not theory:
                 own = unknown_where_blocked(own, yields_noticeably(theory, surface, u))
             return np.sqrt(own[0]) * np.sqrt(own[1]), *own
-        obstructing = area_of_flow(theory, surface, u, share)
-        K = flow(surface, u, obstructing) * np.asarray(surface.h_rms) ** 3
+        K = flow_of_contact(theory, surface, u, share) * np.asarray(surface.h_rms) ** 3
         return K, K, K, np.zeros_like(K)
 
     K, x, y, xy = contact.evaluate(answer, 4, {"area": contact.area})
@@ -381,6 +388,47 @@ def leakage_of(contact: Any) -> Leakage:
 def _never_yields(theory: Any) -> bool:
     """Whether it is the theory of bodies without a hardness, with an attraction or not."""
     return bool(np.isinf(getattr(theory, "hardness", np.inf)).all())
+
+
+def flow_of_contact(
+    theory: Theory, surface: Any, u: FloatArray, area: FloatArray
+) -> FloatArray:
+    """K/h_rms^3 of mean separations u [length] and A/A0 of a theory; 0 where blocked.
+
+    NaN after unloading from a contact that was blocked.
+    """
+    k = flow(surface, u, area_of_flow(theory, surface, u, area))
+    unloads, peak = unloading_from(theory, surface, u)
+    if not unloads.any():
+        return k
+    u0, area0, yielded = (
+        np.broadcast_to(part, np.shape(k))
+        for part in (peak.mean_separation, peak.area, peak.yielded)
+    )
+    smaller = shipped_flow().constants.elastic_area(area0, np.nan_to_num(yielded))
+    before = flow(surface, u0, smaller)
+    h_rms = np.asarray(surface.h_rms)
+    aperture = np.cbrt(before) + OPENING * (u - u0) / h_rms
+    # of faces that hardly touch it is that of their mean gap
+    gap = u / h_rms
+    after = np.minimum(aperture**3, gap**3 * wide_gap(gap))
+    return np.where(unloads, np.where(before > 0, after, np.nan), k)
+
+
+def unloading_from(theory: Any, surface: Any, u: FloatArray) -> tuple[Any, Any]:
+    """Mask of contacts below the largest pressure after yielding, and the contact at that pressure."""
+    if not hasattr(theory, "peak"):
+        return np.zeros(np.shape(u), bool), None
+    peak = theory.peak(surface)
+    return peak.remembered & (u > peak.mean_separation), peak
+
+
+def largest_area(
+    theory: Theory, surface: Any, u: FloatArray, area: FloatArray
+) -> FloatArray:
+    """A/A0, after unloading that at the largest pressure, whose flow is less certain."""
+    unloads, peak = unloading_from(theory, surface, u)
+    return np.where(unloads, peak.area, area) if unloads.any() else area
 
 
 def area_of_flow(
@@ -444,7 +492,7 @@ def reasons_against(
         many = f"leakage: A/A0 is above {LARGEST_AREA:g}, where cells of one spectrum differ by factors"
         far = f"leakage: the longest wavelength is more than {SIMULATED:g} times the shortest, beyond simulated flow"
         found = {
-            many: area > LARGEST_AREA,
+            many: largest_area(theory, surface, u, area) > LARGEST_AREA,
             far: everywhere & (np.asarray(surface.zeta_1) > SIMULATED),
         }
     if (
@@ -465,11 +513,33 @@ def reasons_against(
                 "leakage: flow of yielded contacts was not compared for this theory"
             )
             found[untested] = yields
-    after = "leakage: flow after a larger pressure was not compared with simulations"
-    found[after] = everywhere & theory.unloads(surface, u)
+    if simulated is not None:
+        after = "leakage: flow after a larger pressure was not compared with simulations"
+        found[after] = everywhere & theory.unloads(surface, u)
+    else:
+        found |= _reasons_of_unloading(theory, surface, u)
     for reason in theory.reasons_of_flow():
         found[reason] = everywhere
     return found
+
+
+def _reasons_of_unloading(theory: Any, surface: Any, u: FloatArray) -> dict[str, Any]:
+    """Reasons why the flow after unloading is not valid."""
+    unloads, peak = unloading_from(theory, surface, u)
+    if not unloads.any():
+        return {}
+    low, high = UNLOADED_ETA
+    eta = np.asarray(theory.hardness) / np.asarray(surface.rms_gradient)
+    ratio = theory.answer(surface, u).pressure / peak.pressure
+    text = "leakage: flow after unloading was simulated for"
+    return {
+        f"{text} p_m/(E* g) from {low:g} to {high:g}": unloads
+        & ~((eta >= low) & (eta <= high)),
+        f"{text} longest wavelengths of at most {UNLOADED_TO:g} times the shortest": unloads
+        & (np.asarray(surface.zeta_1) > UNLOADED_TO),
+        f"{text} pressures from {LEAST_RATIO:g} of the largest on": unloads
+        & (ratio < LEAST_RATIO),
+    }
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

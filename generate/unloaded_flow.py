@@ -1,0 +1,200 @@
+"""Flow through the gaps of yielded contacts after unloading, by boundary elements, and how well the law describes it."""
+
+import csv
+import itertools
+import pathlib
+from collections.abc import Iterator
+from typing import Any
+
+import click
+import numpy as np
+import pandas as pd
+
+from generate import files
+from generate.boundary_elements.solve import load_at, prepared
+from generate.boundary_elements.surfaces import Recipe, heights
+from mbma_tables import Bodies, Surface, contact
+from mbma_tables.common import progress
+from mbma_tables.common.arguments import FloatArray
+from mbma_tables.contacts.quantities.leakage import OPENING
+from mbma_tables.theories.simulated.boundary_elements import Contact
+from mbma_tables.theories.simulated.reynolds import flow_conductance
+
+FILE = files.ROOT / "docs" / "data" / "unloaded_flow.csv"
+AREAS = (0.01, 0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5)
+UNLOADED = (0.06, 0.15, 0.3, 0.45)  # areas from which loads are taken back
+SHARES = (0.5, 0.2, 0.05)  # of the largest load, to which they are
+# longest waves a side and zeta_1, Hurst exponents and hardness over E* g
+FITTED = ((4, 16.0), (8, 8.0)), (0.8, 0.5, 0.3, 1.0), (0.12, 0.03, 0.25, 0.06, 0.5)
+HELD_OUT = ((5, 12.0), (8, 8.0)), (0.4, 0.9, 0.65), (0.09, 0.18, 0.04, 0.35)
+LARGE = ((4, 32.0),), (0.8, 0.5), (0.12, 0.3)
+POINTS_A_WAVE = 4
+H_MAX = (
+    4.0  # [h_rms], about that of the cells; the law's gap and area hardly depend on it
+)
+Q0 = 0.02  # [1/h_rms], so small that gradients are
+OPEN = 1e-6  # flow [h_rms^3] below which a cell is nearly blocked
+EDGES = (0.0, 0.1, 0.2, 0.32)  # A/A0 at the largest pressure
+COLUMNS = (
+    *("hurst", "zeta_1", "waves", "seed", "held_out", "eta", "largest_force", "force"),
+    *("area", "yielded", "mean_separation", "flow_x", "flow_y"),
+)
+
+
+def recipes(
+    waves: Any, hursts: Any, etas: Any, first_seed: int
+) -> Iterator[tuple[Recipe, float]]:
+    """Surfaces with a hardness each, those of one Hurst exponent far apart."""
+    seed = first_seed
+    for eta, hurst, (count, zeta_1) in itertools.product(etas, hursts, waves):
+        points = round(count * zeta_1 * POINTS_A_WAVE)
+        yield Recipe("self_affine", hurst, zeta_1, count, seed, points), eta
+        seed += 1
+
+
+def cases() -> list[tuple[Recipe, float, bool]]:
+    """All surfaces in the order in which they are simulated."""
+    fitted = [(*one, False) for one in recipes(*FITTED, 3001)]
+    held_out = [(*one, True) for one in recipes(*HELD_OUT, 4001)]
+    both = itertools.zip_longest(fitted, held_out)
+    small = [case for pair in both for case in pair if case is not None]
+    return small + [(*one, True) for one in recipes(*LARGE, 5001)]
+
+
+def flattened(contact: Contact, hardness: float) -> FloatArray:
+    """The surface without the heights by which yielded points overlap the plane."""
+    yielded = contact.traction >= hardness * (1 - 1e-9)
+    touching = contact.traction > 0
+    gap = contact.deflect(contact.traction) - contact.surface
+    is_elastic = touching & ~yielded
+    level = gap[is_elastic].mean() if is_elastic.any() else gap[touching].max()
+    overlap = np.where(yielded, np.maximum(level - gap, 0.0), 0.0)
+    return np.asarray(contact.surface - overlap)
+
+
+def rows_of(recipe: Recipe, eta: float, is_held_out: bool) -> Iterator[list[str]]:
+    """Rows of one surface, load by load up to its blocking; lengths in h_rms."""
+    height, _, _ = prepared(heights(recipe), recipe.sizes, recipe.q0)
+    h_rms = float(height.std())
+    contact = Contact(height, recipe.sizes, hardness=eta)
+
+    def row(found: dict[str, float], gap: FloatArray, *forces: float) -> list[str]:
+        flow = flow_conductance(gap / h_rms, recipe.sizes)
+        given = (recipe.hurst, recipe.zeta_1, recipe.waves, recipe.seed, is_held_out)
+        u = found["mean_separation"] / h_rms
+        solved = found["area"], found["area_yielded"], u, *flow
+        return [f"{number:.6g}" for number in (*given, eta, *forces, *solved)]
+
+    for area in AREAS:
+        force = load_at(area, eta)
+        loaded = row(contact.press(force), contact.gap, force, force)
+        yield loaded
+        if area in UNLOADED:
+            after = Contact(flattened(contact, eta), recipe.sizes)
+            for share in SHARES:
+                found = after.press(share * force) | {"area_yielded": 0.0}
+                # lengths as those of the map before
+                yield row(found, after.gap, force, share * force)
+        if loaded[-2:] == ["0", "0"]:
+            return
+
+
+def simulate(path: pathlib.Path) -> None:
+    """Simulate the surfaces that a file lacks; rows are added to it surface by surface."""
+    done = set()
+    if path.is_file():
+        with open(path, newline="") as stream:
+            done = {row["seed"] for row in csv.DictReader(stream)}
+    else:
+        path.write_text(",".join(COLUMNS) + "\n")
+    for number, (recipe, eta, is_held_out) in enumerate(cases(), 1):
+        if str(recipe.seed) in done:
+            continue
+        progress.doing(f"surface {number} of {len(cases())}")
+        rows = [",".join(row) for row in rows_of(recipe, eta, is_held_out)]
+        with open(path, "a") as stream:
+            stream.write("\n".join(rows) + "\n")
+
+
+def openings(rows: pd.DataFrame) -> pd.DataFrame:
+    """Growth of the simulated hydraulic aperture over that of the mean gap, at each lower load."""
+    data = rows.assign(aperture=np.cbrt(np.sqrt(rows.flow_x * rows.flow_y)))
+    keys = ["seed", "largest_force"]
+    names = [*keys, "area", "aperture", "mean_separation"]
+    first = data[data.force == data.largest_force][names]
+    lower = data[data.force < data.largest_force]
+    both = lower.merge(first, on=keys, suffixes=("", "_0"))
+    grown = both.aperture - both.aperture_0
+    return both.assign(opening=grown / (both.mean_separation - both.mean_separation_0))
+
+
+def errors(rows: pd.DataFrame) -> pd.DataFrame:
+    """ln(law/simulation) of flow at each lower load, over the stated scatter too, and A/A0 at the largest load."""
+    parts = []
+    is_open = (rows.flow_x > OPEN) & (rows.flow_y > OPEN)
+    lower = rows[(rows.force < rows.largest_force) & is_open]
+    keys = ["hurst", "zeta_1", "eta", "held_out", "largest_force"]
+    for (hurst, zeta_1, eta, held_out, largest), some in lower.groupby(keys):
+        surface = Surface(hurst, Q0, Q0 * zeta_1, 1.0, H_MAX)
+        gradient = float(surface.rms_gradient)
+        bodies = Bodies(1.0, hardness=eta * gradient)
+        top = contact(surface, bodies, pressure=largest * gradient, theory="calibrated")
+        leak = contact(
+            surface,
+            bodies,
+            pressure=some.force.to_numpy() * gradient,
+            largest_pressure=largest * gradient,
+            theory="calibrated",
+        ).leakage
+        miss = np.log(leak.K) - np.log(some.flow_x * some.flow_y).to_numpy() / 2
+        found = {
+            "held_out": held_out,
+            "area": float(top.area),
+            "share": (some.force / largest).round(3).to_numpy(),
+            "error": miss,
+            "standardised": miss / leak.scatter,
+            "is_valid": leak.valid,
+            "is_blocked": leak.blocked,
+        }
+        parts.append(pd.DataFrame(found))
+    return pd.concat(parts, ignore_index=True)
+
+
+def table(found: pd.DataFrame) -> list[str]:
+    """Bias and root mean square on surfaces that no constant was fitted to, as lines of Markdown."""
+    unseen = found[found.held_out == 1]
+    titles = [f"{100 * low:g}-{100 * high:g}%" for low, high in itertools.pairwise(EDGES)]
+    lines = [f"| p/p0 | {' | '.join(titles)} |", f"| --- {'| --- ' * len(titles)}|"]
+    for share in sorted(unseen.share.unique(), reverse=True):
+        cells = []
+        for low, high in itertools.pairwise(EDGES):
+            inside = (unseen.area > low) & (unseen.area <= high)
+            miss = unseen.error[inside & (unseen.share == share)]
+            root_mean_square = np.sqrt(np.mean(miss**2))
+            cells.append(f"{miss.mean():+.2f}, {root_mean_square:.2f} ({miss.size})")
+        lines.append(f"| {share:g} | {' | '.join(cells)} |")
+    return lines
+
+
+@click.command()
+@click.option("--simulate", "is_simulated", is_flag=True, help="Add missing surfaces.")
+@click.option(
+    "--data",
+    "path",
+    type=click.Path(path_type=pathlib.Path),
+    default=FILE,
+    help="File of rows.",
+)
+def unloaded_flow(is_simulated: bool, path: pathlib.Path) -> None:
+    """How flow grows as yielded contacts are unloaded, and the law beside simulations that it was not fitted to."""
+    if is_simulated:
+        with progress.shown("surfaces"):
+            simulate(path)
+    rows = pd.read_csv(path)
+    found = openings(rows)
+    fitted = found[(found.held_out == 0) & (found.area_0 < EDGES[-1])]
+    progress.echo(
+        f"growth of the aperture over that of the gap {fitted.opening.median():.3f}, "
+        f"deviation {fitted.opening.std():.3f}; the law has {OPENING:g}"
+    )
+    progress.echo("\n".join(table(errors(rows))))
