@@ -35,7 +35,8 @@ def subroutine(
     """The C of a law with a routine, whose template is languages/ROUTINE.c; `texts` are those of the documentation."""
     return c_language(
         usage,
-        of_solver="void xit_(void) {} /* of Abaqus */\n",
+        # of Abaqus, and of Abaqus/Explicit
+        of_solver="void xit_(void) {}\nvoid xplb_exit_(void) {}\n",
         parts=parts,
         subroutine=routine,
         conductance_alone=conductance_alone,
