@@ -82,12 +82,9 @@ def sealing_pressure(
     """
     wanted, unit = _rate(rate)
     seal = (gas, inlet, outlet, width, length, temperature, unit)
-    fullest = (
-        FULLEST
-        if law.area_turning_point is None
-        else float(law.area(law.area_turning_point))
-    )
-    interval = math.log(LIGHTEST), math.log(min(fullest, _largest_area(law)))
+    deepest = law.lowest if law.area_turning_point is None else law.area_turning_point
+    fullest = min(FULLEST, float(law.area(separation=deepest)))
+    interval = math.log(LIGHTEST), math.log(fullest)
 
     def ln_rate(log_area: float, deviations: float) -> float:
         leak = law.at(area=math.exp(log_area)).leakage
@@ -97,12 +94,13 @@ def sealing_pressure(
         spread = deviations * _scatter(leak) if deviations else 0.0
         return math.log(found / wanted) + spread
 
-    if ln_rate(interval[0], 0.0) < 0:
+    lightest, heaviest = (ln_rate(end, 0.0) for end in interval)
+    if lightest < 0:
         raise OutOfRangeError(
             f"rate = {rate!r}: a contact on {LIGHTEST:g} of the area leaks less, "
-            f"{math.exp(ln_rate(interval[0], 0.0)) * wanted:.3g} {unit}"
+            f"{math.exp(lightest) * wanted:.3g} {unit}"
         )
-    if ln_rate(interval[1], 0.0) > 0:
+    if heaviest > 0:
         raise OutOfRangeError(
             f"rate = {rate!r}: the law ends at {math.exp(interval[1]):.3g} of the area, where "
             "the contact leaks more"
@@ -131,11 +129,6 @@ def sealing_pressure(
         for one in (area, *ends)
     )
     return SealingPressure(pressure, low, high, area, scatter, bool(leak.valid))
-
-
-def _largest_area(law: ContactLaw) -> float:
-    """A/A0 at the law's least gap."""
-    return float(law.area(separation=law.lowest))
 
 
 def _scatter(leak: Any) -> float:

@@ -38,7 +38,7 @@ from mbma_tables.contacts.quantities.effective_medium import (
     contact_factor,
     wide_gap,
 )
-from mbma_tables.contacts.quantities.gas_flow import GasFlow, gas_for_flow, mass_flow
+from mbma_tables.contacts.quantities.gas_flow import gas_for_flow, mass_flow
 from mbma_tables.contacts.quantities.state import State
 from mbma_tables.contacts.quantities.validity import reasons_with_masks, valid_where_none
 from mbma_tables.core import core
@@ -155,7 +155,7 @@ class Leakage(Displayed):
 
     blocked = property(
         lambda self: self.K == 0,
-        doc="Whether contact percolates, A/A0 from 0.42 on, or 0.59 where it yields; False where K is not known.",
+        doc="Whether contact percolates, A/A0 from 0.42 on, or 0.55 where all of it yields; False where K is not known.",
     )
 
     def along(self, direction: ArrayLike | str) -> Any:
@@ -330,38 +330,32 @@ class Leakage(Displayed):
                 "its unit"
             )
         metre = factor("m", units.length)
-        flowing = gas_for_flow(gas, temperature)
-        in_unit = flowing.in_unit(unit)
         pascals = Units(stress="Pa")
-        given = {
+        own_numbers = dict(gas) if isinstance(gas, Mapping) else {}
+        arrays = {
+            "K": self.K,
+            "area": self._contact.area,
             "width": units.number("width", width),
             "inlet": pascals.number("inlet", inlet),
             "outlet": pascals.number("outlet", outlet),
             "length": metre if length is None else units.number("length", length),
-            **dict(zip(GasFlow._fields, flowing, strict=True)),
-            "in_unit": in_unit,
+            "temperature": temperature,
+            **own_numbers,
         }
-        arrays = {"K": self.K, "area": self._contact.area} | given
 
         def rate(
-            theory: Theory,
-            surface: Any,
-            u: Any,
-            E_star: Any,
-            K: Any,
-            area: Any,
-            *seal: Any,
-        ) -> tuple[FloatArray]:
-            across, high, low, size, *of_gas, factor_of_unit = seal
+            theory: Theory, surface: Any, u: Any, E_star: Any, K: Any, area: Any,
+            across: Any, high: Any, low: Any, size: Any, T: Any, *of_gas: Any,
+        ) -> tuple[FloatArray]:  # fmt: skip
+            named = dict(zip(own_numbers, of_gas, strict=True))
+            flowing = gas_for_flow(named or gas, T)
             for name, value in (("width", across), ("inlet", high), ("length", size)):
                 positive_array(name, value)
             low = finite_array("outlet", low)
             is_below = (low >= 0) & (low <= high)
             require("outlet", low, is_below, "from 0 to the inlet's pressure")
-            per_metre = mass_flow(
-                K / metre**3, area, GasFlow(*of_gas), high, low, across / metre
-            )
-            return (per_metre * (size / metre) * factor_of_unit,)
+            per_metre = mass_flow(K / metre**3, area, flowing, high, low, across / metre)
+            return (per_metre * (size / metre) * flowing.in_unit(unit),)
 
         return self._contact.evaluate(rate, 1, arrays)[0]
 

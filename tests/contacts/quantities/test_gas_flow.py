@@ -13,6 +13,7 @@ from scipy.integrate import quad
 
 from mbma_tables import (
     InputError,
+    Joint,
     OutOfRangeError,
     Surface,
     contact,
@@ -150,6 +151,34 @@ def test_arrays_and_labels():
     assert float(rates[2].max()) == 0.0
     one = leak(area=0.1).gas("air", "2 bar", 0.0, "2 mm")
     assert float(rates[1, 1]) == pytest.approx(one, rel=1e-12)
+
+
+def test_temperatures_and_numbers_of_a_gas_keep_their_labels():
+    found = leak(area=xr.DataArray([0.02, 0.1], dims="load"))
+    seal = (2e5, 0.0, "2 mm")
+    by_temperature = found.gas(
+        "air", *seal, temperature=xr.DataArray([250.0, 300.0, 400.0], dims="T")
+    )
+    assert by_temperature.dims == ("load", "T")
+    one = leak(area=0.1).gas("air", *seal, temperature=400.0)
+    assert float(by_temperature[1, 2]) == pytest.approx(one, rel=1e-12)
+    viscosity = xr.DataArray([1.5e-5, 1.9e-5], dims="gas")
+    by_gas = found.gas({"mass": 0.029, "viscosity": viscosity}, *seal)
+    assert by_gas.dims == ("load", "gas")
+
+
+def test_contacts_laws_and_joints_leak_alike():
+    face = {"Rq": "2 um", "hurst": 0.8, "longest": "500 um", "shortest": "10 um"}
+    joint = Joint(face, bodies="20 MPa", nominal_area="4 cm^2", theory="calibrated")
+    asked = ("air", "2 bar", "0 bar", "2 mm")
+    of_joint = joint.at_pressure("0.05 MPa").leakage.gas(*asked)
+    of_law = joint.law().at_pressure("0.05 MPa").leakage.gas(*asked)
+    surface = joint.surface
+    of_contact = contact(
+        surface, "20 MPa", pressure="0.05 MPa", theory="calibrated"
+    ).leakage.gas(*asked)
+    assert of_joint == pytest.approx(of_contact, rel=1e-12)
+    assert of_law == pytest.approx(of_contact, rel=1e-3)
 
 
 def test_simulated_gaps_that_no_constant_was_fitted_to():
