@@ -3,6 +3,7 @@
 import itertools
 import math
 import pathlib
+from collections.abc import Iterator
 from typing import Any
 
 import click
@@ -13,10 +14,11 @@ from scipy.optimize import least_squares
 from generate import files
 from generate.boundary_elements.solve import load_at, prepared
 from generate.boundary_elements.surfaces import Recipe, heights
+from generate.page import Cell, table
 from mbma_tables.common import progress
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file
-from mbma_tables.contacts.quantities.gas_flow import POWER, WIDER, poiseuille
+from mbma_tables.contacts.quantities.gas_flow import POWER, WIDER, flow_over_liquid
 from mbma_tables.theories.simulated.boundary_elements import Contact
 from mbma_tables.theories.simulated.reynolds import flow_conductance
 
@@ -40,8 +42,7 @@ LARGEST_AREA = 0.3  # of the fit
 
 def plates(gap: FloatArray, path: float) -> FloatArray:
     """Flow of a gas between plates over that of a liquid, at gaps and a mean free path of one unit."""
-    D = math.sqrt(math.pi) / 2 * gap / path
-    return np.asarray(6 * poiseuille(D) / D)
+    return flow_over_liquid(math.sqrt(math.pi) / 2 * gap / path)
 
 
 def flow(gap: FloatArray) -> float:
@@ -49,7 +50,9 @@ def flow(gap: FloatArray) -> float:
     return math.sqrt(math.prod(flow_conductance(gap)))
 
 
-def rows_of(waves: int, zeta_1: float, hurst: float, seed: int, eta: float) -> Any:
+def rows_of(
+    waves: int, zeta_1: float, hurst: float, seed: int, eta: float
+) -> Iterator[list[str]]:
     """Rows of one surface, load by load up to its blocking; lengths in h_rms."""
     recipe = Recipe("self_affine", hurst, zeta_1, waves, seed, POINTS)
     height, _, _ = prepared(heights(recipe), recipe.sizes, recipe.q0)
@@ -90,22 +93,18 @@ def is_held_out(data: pd.DataFrame) -> Any:
     return (data.waves == HELD_OUT[0]).to_numpy()
 
 
-def table(data: pd.DataFrame) -> list[str]:
-    """Root mean squares by contact and mean free path, as lines of Markdown."""
-    lines = [
-        f"| A/A0 | {' | '.join(f'{path:g} h_rms' for path in PATHS)} | largest |",
-        f"| --- {'| --- ' * (len(PATHS) + 1)}|",
-    ]
+def accuracy(data: pd.DataFrame) -> str:
+    """Root mean squares by contact and mean free path, on surfaces that no constant was fitted to."""
     found = errors(data)
+    rows = list[list[Cell]]()
     for low, high in itertools.pairwise(EDGES):
-        some = is_held_out(data) & ((data.area > low) & (data.area <= high)).to_numpy()
-        rms = np.sqrt((found[some] ** 2).mean(axis=0))
-        numbers = " | ".join(f"{one:.3f}" for one in rms)
-        lines.append(
-            f"| {100 * low:g}-{100 * high:g}% ({some.sum()}) | {numbers} | "
-            f"{np.abs(found[some]).max():.3f} |"
-        )
-    return lines
+        inside = ((data.area > low) & (data.area <= high)).to_numpy()
+        some = found[inside & is_held_out(data)]
+        root_mean_squares = np.sqrt((some**2).mean(axis=0))
+        title = f"{100 * low:g}-{100 * high:g}% ({len(some)})"
+        rows.append([title, *root_mean_squares, np.abs(some).max()])
+    paths = " | ".join(f"{path:g} h_rms" for path in PATHS)
+    return table(f"A/A0 | {paths} | largest", rows, "{} | {:.3f}")
 
 
 @click.command()
@@ -131,4 +130,4 @@ def gas_flow(simulate: bool, data: pathlib.Path) -> None:
     some = rows[~is_held_out(rows) & (rows.area < LARGEST_AREA)]
     fit = least_squares(lambda x: errors(some, *x).ravel(), (WIDER, POWER)).x
     progress.echo(f"fitted: WIDER {fit[0]:.3f}, POWER {fit[1]:.3f}")
-    progress.echo("\n".join(table(rows)))
+    progress.echo(accuracy(rows))

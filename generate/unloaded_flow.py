@@ -13,6 +13,7 @@ import pandas as pd
 from generate import files
 from generate.boundary_elements.solve import load_at, prepared
 from generate.boundary_elements.surfaces import Recipe, heights
+from generate.page import Cell, table
 from mbma_tables import Bodies, Surface, contact
 from mbma_tables.common import progress
 from mbma_tables.common.arguments import FloatArray
@@ -61,17 +62,6 @@ def cases() -> list[tuple[Recipe, float, bool]]:
     return small + [(*one, True) for one in recipes(*LARGE, 5001)]
 
 
-def flattened(contact: Contact, hardness: float) -> FloatArray:
-    """The surface without the heights by which yielded points overlap the plane."""
-    yielded = contact.traction >= hardness * (1 - 1e-9)
-    touching = contact.traction > 0
-    gap = contact.deflect(contact.traction) - contact.surface
-    is_elastic = touching & ~yielded
-    level = gap[is_elastic].mean() if is_elastic.any() else gap[touching].max()
-    overlap = np.where(yielded, np.maximum(level - gap, 0.0), 0.0)
-    return np.asarray(contact.surface - overlap)
-
-
 def rows_of(recipe: Recipe, eta: float, is_held_out: bool) -> Iterator[list[str]]:
     """Rows of one surface, load by load up to its blocking; lengths in h_rms."""
     height, _, _ = prepared(heights(recipe), recipe.sizes, recipe.q0)
@@ -90,7 +80,7 @@ def rows_of(recipe: Recipe, eta: float, is_held_out: bool) -> Iterator[list[str]
         loaded = row(contact.press(force), contact.gap, force, force)
         yield loaded
         if area in UNLOADED:
-            after = Contact(flattened(contact, eta), recipe.sizes)
+            after = contact.unloading()
             for share in SHARES:
                 found = after.press(share * force) | {"area_yielded": 0.0}
                 # lengths as those of the map before
@@ -160,20 +150,20 @@ def errors(rows: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def table(found: pd.DataFrame) -> list[str]:
-    """Bias and root mean square on surfaces that no constant was fitted to, as lines of Markdown."""
+def accuracy(found: pd.DataFrame) -> str:
+    """Bias and root mean square on surfaces that no constant was fitted to."""
     unseen = found[found.held_out == 1]
-    titles = [f"{100 * low:g}-{100 * high:g}%" for low, high in itertools.pairwise(EDGES)]
-    lines = [f"| p/p0 | {' | '.join(titles)} |", f"| --- {'| --- ' * len(titles)}|"]
+    rows = list[list[Cell]]()
     for share in sorted(unseen.share.unique(), reverse=True):
-        cells = []
+        cells: list[Cell] = [f"{share:g}"]
         for low, high in itertools.pairwise(EDGES):
             inside = (unseen.area > low) & (unseen.area <= high)
             miss = unseen.error[inside & (unseen.share == share)]
-            root_mean_square = np.sqrt(np.mean(miss**2))
-            cells.append(f"{miss.mean():+.2f}, {root_mean_square:.2f} ({miss.size})")
-        lines.append(f"| {share:g} | {' | '.join(cells)} |")
-    return lines
+            root_mean_square = float(np.sqrt(np.mean(miss**2)))
+            cells.append((float(miss.mean()), root_mean_square, miss.size))
+        rows.append(cells)
+    titles = [f"{100 * low:g}-{100 * high:g}%" for low, high in itertools.pairwise(EDGES)]
+    return table(f"p/p0 | {' | '.join(titles)}", rows, "{} | {:+.2f}, {:.2f} ({:.0f})")
 
 
 @click.command()
@@ -197,4 +187,4 @@ def unloaded_flow(is_simulated: bool, path: pathlib.Path) -> None:
         f"growth of the aperture over that of the gap {fitted.opening.median():.3f}, "
         f"deviation {fitted.opening.std():.3f}; the law has {OPENING:g}"
     )
-    progress.echo("\n".join(table(errors(rows))))
+    progress.echo(accuracy(errors(rows)))

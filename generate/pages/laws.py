@@ -11,8 +11,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
+from generate import gas_flow, unloaded_flow
 from generate.boundary_elements.evidence import Capped, capped
 from generate.boundary_elements.surfaces import REFINEMENT, SPLITS, TRAINING
 from generate.calibrated_file import binned
@@ -203,7 +205,15 @@ def refinement() -> str:
 
 def leakage() -> Measured:
     seen = cases(dataset("leakage"))
-    parts = {"accuracy": leakage_accuracy(), "cells": of_cells(seen), "floor": floor()}
+    parts = {
+        "gas": gas_flow.accuracy(pd.read_csv(gas_flow.FILE)),
+        "accuracy": leakage_accuracy(),
+        "cells": of_cells(seen),
+        "floor": floor(),
+        "unloaded": unloaded_flow.accuracy(
+            unloaded_flow.errors(pd.read_csv(unloaded_flow.FILE))
+        ),
+    }
     return parts, {"docs/figures/leakage.svg": draw_leakage(seen)}
 
 

@@ -31,7 +31,7 @@ _PREFIXES = {
     **{"": 1.0, "k": 1e3, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12, "f": 1e-15},
     **{"a": 1e-18, "z": 1e-21},
 }
-NUMBER_OF_QUADRATURE = 2000
+QUADRATURE_NODES = 200  # of the integral of a traction over all gaps
 
 
 @dataclasses.dataclass(frozen=True)
@@ -173,7 +173,7 @@ def _normalized(
 ) -> Callable[..., FloatArray]:
     """A function of the gap over the range, divided by its integral."""
     # x from 0 to infinity as s/(1 - s)
-    node, weight = np.polynomial.legendre.leggauss(NUMBER_OF_QUADRATURE // 10)
+    node, weight = np.polynomial.legendre.leggauss(QUADRATURE_NODES)
     s = (node + 1) / 2
     x = s / (1 - s)
     with np.errstate(all="ignore"):

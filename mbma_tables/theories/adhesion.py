@@ -51,7 +51,7 @@ PARTING_NODES = 64
 ROUNDING = 1e-13  # relative, of net pressures that are found
 LAPLACIAN = 8 / 3  # mean square of the Laplacian over m4, of isotropic surfaces
 LEAST_SHARE = 1e-3  # of the attraction at zero load, the least net pressure of laws
-SIMULATE = (
+NECKING = (
     "its contact edges neck, and area and force depend on the path; no theory answers this "
     "yet, a smoother face, a smaller work or a longer range is covered"
 )
@@ -125,15 +125,6 @@ class Adhesive(Theory):
         decay = (share * shape(gap / self.adhesion.range)).sum(axis=-1)
         in_contact = THETA * float(shape(np.zeros(1))[0]) * area
         return np.asarray(self._traction * (decay + in_contact))
-
-    def decay(
-        self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
-    ) -> FloatArray:
-        """Mean of the traction over w/rho where the contact is open."""
-        share, gap = self.elastic.open_gaps(surface, mean_separation, area)
-        return np.asarray(
-            (share * self.adhesion.shape(gap / self.adhesion.range)).sum(axis=-1)
-        )
 
     def net(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Net pressure over E* at mean gaps."""
@@ -406,9 +397,9 @@ class Adhesive(Theory):
         strong = np.broadcast_to(pull > MOST_STRENGTH, shape)
         other = np.full(shape, not self.adhesion.is_exponential)
         reasons = {
-            f"adhesion: Tabor's number of a summit is above {MOST_TABOR:g}, where {SIMULATE}": stiff,
+            f"adhesion: Tabor's number of a summit is above {MOST_TABOR:g}, where {NECKING}": stiff,
             f"adhesion: the range is below {LEAST_RANGE:g} h_rms, the shortest of gaps that were simulated": short,
-            f"adhesion: the traction is above {MOST_STRENGTH:g} E* times the rms gradient, where {SIMULATE}": strong,
+            f"adhesion: the traction is above {MOST_STRENGTH:g} E* times the rms gradient, where {NECKING}": strong,
             "adhesion: only an exponential traction was simulated": other,
             "adhesion: the net pressure is a tension, of which few contacts were simulated": (
                 answer.pressure < 0

@@ -41,8 +41,8 @@ class LeakageLaw:
     law: Any  # the ContactLaw whose area and mean separation it is of
     h_rms: float  # [length]
     #: mean separation u [length] at and below which contact percolates and nothing flows;
-    #: of a contact that yields the flow is not known there; -infinity where contact never
-    #: percolates
+    #: of simulated elastic gaps of a contact that yields the flow is not known there;
+    #: -infinity where contact never percolates
     blocked_at: float
     # bound on the polynomials' relative error at the law's area, whose own errors come on
     # top times -d ln k/d ln A
@@ -69,8 +69,8 @@ class LeakageLaw:
     ) -> Numbers:
         """Flow coefficient at gaps, pressures or areas; exactly 0 where blocked.
 
-        With a hardness NaN there: yielded patches are compact and leave channels, which
-        only a simulation of the yielded gaps knows.
+        Of simulated elastic gaps NaN there where the contact yields: yielded patches are
+        compact and leave channels.
         """
         d = self.law.separation(
             mean_separation, separation=separation, pressure=pressure, area=area

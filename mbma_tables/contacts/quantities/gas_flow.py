@@ -160,10 +160,21 @@ def poiseuille_integral(D: ArrayLike) -> FloatArray:
     return found
 
 
+def flow_over_liquid(D: ArrayLike) -> FloatArray:
+    """6 Q/D, flow of a gas between plates over that of a liquid, at inverse Knudsen numbers D > 0.
+
+    Examples
+    --------
+    >>> flow_over_liquid([0.1, 1.0, 100.0]).round(2).tolist()
+    [122.53, 9.22, 1.06]
+    """
+    return np.asarray(6 * poiseuille(D) / np.asarray(D))
+
+
 def width_of_channels(K: ArrayLike, area: ArrayLike) -> FloatArray:
     """Gap of parallel plates [length] through which a gas flows as through a contact, by K [length^3] and A/A0.
 
-    Flow of a gas, over that of a liquid, is f = 6 Q(D)/D there.
+    Flow of a gas, over that of a liquid, is `flow_over_liquid` there.
     """
     share = np.asarray(area, float)
     return np.asarray(np.cbrt(K) * (1 + WIDER * share**POWER))

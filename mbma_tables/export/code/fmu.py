@@ -255,9 +255,7 @@ def _description(
             ET.SubElement(interface, "SourceFiles"), "File", {"name": f"{name}.c"}
         )
     _add_units(root, variables, exported)
-    categories = ET.SubElement(root, "LogCategories")
-    for category in ("logStatusDiscard", "logStatusError"):
-        ET.SubElement(categories, "Category", {"name": category})
+    _add_log_categories(root)
     listed = ET.SubElement(root, "ModelVariables")
     structure = ET.SubElement(root, "ModelStructure")
     of_real = ("unit", "start", "min", "max")
@@ -273,6 +271,12 @@ def _description(
                 parent, "Unknown", {"index": str(place), "dependencies": str(INPUT + 1)}
             )
     return _written(root)
+
+
+def _add_log_categories(root: ET.Element) -> None:
+    categories = ET.SubElement(root, "LogCategories")
+    for category in ("logStatusDiscard", "logStatusError"):
+        ET.SubElement(categories, "Category", {"name": category})
 
 
 def _add_units(
@@ -328,9 +332,7 @@ def _description_of_fmi3(
     steps = {"canHandleVariableCommunicationStepSize": "true"}
     ET.SubElement(root, "CoSimulation", provides | steps)
     _add_units(root, variables, exported)
-    categories = ET.SubElement(root, "LogCategories")
-    for category in ("logStatusDiscard", "logStatusError"):
-        ET.SubElement(categories, "Category", {"name": category})
+    _add_log_categories(root)
     listed = ET.SubElement(root, "ModelVariables")
     structure = ET.SubElement(root, "ModelStructure")
     for reference, all_of in enumerate(variables):
