@@ -4,10 +4,10 @@ import csv
 
 import numpy as np
 
-from generate.page import Measured
+from generate.page import Cell, Measured, table
 from mbma_tables import Joint
 from mbma_tables.common.files import shipped_file
-from mbma_tables.common.plots import new_figure
+from mbma_tables.common.plots import new_figure, number_ticks
 
 # W/(m^2 K), within 10%, at pressures [MPa] of ground steel on steel in air; roughness and steel
 # not stated. Autodesk Moldflow Insight, help on interface conductance
@@ -34,14 +34,8 @@ def joint(face: dict[str, str], metal: str = "steel 1020") -> Joint:
 
 def conductances() -> tuple[str, dict[str, object]]:
     """A table of the conductance of ground steel, and its picture."""
-    lines = [
-        "| known of the faces | "
-        + " | ".join(f"{p:g} MPa" for p in GROUND)
-        + " | valid |"
-    ]
-    lines.append("| --- |" + " --- |" * (len(GROUND) + 1))
-    measured = " | ".join(f"{value:,.0f} +- 10%" for value in GROUND.values())
-    lines.append(f"| measured | {measured} | |")
+    measured = [f"{value:,.0f} +- 10%" for value in GROUND.values()]
+    rows: list[list[Cell]] = [["measured", *measured, None]]
     figure = new_figure(6.0, 4.0)
     axis = figure.add_subplot()
     pressures = np.geomspace(2.0, 30.0, 7)
@@ -57,7 +51,7 @@ def conductances() -> tuple[str, dict[str, object]]:
             for k in range(len(GROUND))
         ]
         valid = "yes" if found.valid.all() else "no"
-        lines.append(f"| {name} | {' | '.join(cells)} | {valid} |")
+        rows.append([name, *cells, valid])
         beyond = slice(len(GROUND), None)
         axis.fill_between(pressures, low[beyond], high[beyond], color=colour, alpha=0.2)
         axis.plot(pressures, median[beyond], color=colour, label=name)
@@ -67,17 +61,16 @@ def conductances() -> tuple[str, dict[str, object]]:
     )
     axis.set(xscale="log", yscale="log", xlabel="pressure F/A0 [MPa]")
     axis.set_ylabel("total conductance [W/(m$^2$ K)]")
+    number_ticks(axis)
     axis.legend(fontsize="small")
-    return "\n".join(lines), {"docs/figures/measured_conductance.svg": figure}
+    header = ["known of the faces", *(f"{p:g} MPa" for p in GROUND), "valid"]
+    parts = table(" | ".join(header), rows)
+    return parts, {"docs/figures/measured_conductance.svg": figure}
 
 
 def ratios() -> str:
     """Unloading over loading stiffness of pairs of metals, where the faces are not stated."""
-    lines = [
-        "| metal | unloading over loading stiffness, 5% to 95% (median) |",
-        "| --- | --- |",
-    ]
-    lines.append(f"| measured | about {RATIO:g} |")
+    rows: list[list[Cell]] = [["measured", f"about {RATIO:g}"]]
     for metal in RATIO_METALS:
         faces = joint({"Ra": "0.4..3.2 um", "process": "ground"}, metal)
         found = [
@@ -87,8 +80,9 @@ def ratios() -> str:
             [float(each.unloading_stiffness / each.stiffness) for each in found]
         )
         low, median, high = np.quantile(ratio, (0.05, 0.5, 0.95))
-        lines.append(f"| {metal} | {low:.2f} to {high:.2f} ({median:.2f}) |")
-    return "\n".join(lines)
+        rows.append([metal, f"{low:.2f} to {high:.2f} ({median:.2f})"])
+    header = "metal | unloading over loading stiffness, 5% to 95% (median)"
+    return table(header, rows)
 
 
 def exponents() -> str:
@@ -101,15 +95,14 @@ def exponents() -> str:
 
 def measurements() -> Measured:
     """Blocks and the picture of the page of measurements."""
-    table, files = conductances()
-    blocks = {"conductance": table, "ratios": ratios(), "exponents": exponents()}
+    conductance, files = conductances()
+    blocks = {"conductance": conductance, "ratios": ratios(), "exponents": exponents()}
     return blocks, files  # type: ignore[return-value]
 
 
 def metals() -> Measured:
     """All names of metals, with the numbers and where they were read."""
-    lines = ["| name | other names | E [GPa], nu | hardness | W/(m K) | read at |"]
-    lines.append("| --- |" + " --- |" * 5)
+    rows = list[list[Cell]]()
     text = shipped_file("metals.csv").read_text(encoding="utf-8").splitlines()
     for row in csv.DictReader(line for line in text if not line.startswith("#")):
         numbers = f"{row['E']}, {row['nu']}"
@@ -118,6 +111,6 @@ def metals() -> Measured:
         if row["low"] == row["high"]:
             conductivity = row["low"]
         names = row["also"].replace(";", "; ")
-        cells = [row["name"], names, numbers, hardness, conductivity, row["source"]]
-        lines.append(f"| {' | '.join(cells)} |")
-    return {"names": "\n".join(lines)}, {}
+        rows.append([row["name"], names, numbers, hardness, conductivity, row["source"]])
+    header = "name | other names | E [GPa], nu | hardness | W/(m K) | read at"
+    return {"names": table(header, rows)}, {}

@@ -109,7 +109,7 @@ def draw_panels(
                 axes.fill_between(x, *ends, alpha=0.25, color=colour, lw=0)
         axes.set(xlabel=x_label, ylabel=label)
         axes.grid(True, which="major", alpha=0.3)
-        _number_ticks(axes)
+        number_ticks(axes)
         if len(lines) > 1:
             axes.legend()
     if any(axes.collections for axes in figure.axes):
@@ -117,7 +117,7 @@ def draw_panels(
     return figure
 
 
-def _number_ticks(axes: Axes) -> None:
+def number_ticks(axes: Axes) -> None:
     """Plain numbers on logarithmic axes of few decades, where powers of ten are too sparse."""
     ticker = needed("matplotlib.ticker")
     for axis, (low, high) in (
