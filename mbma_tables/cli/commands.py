@@ -15,6 +15,7 @@ from mbma_tables.common.arguments import finite_array
 from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.common.progress import echo
 from mbma_tables.contacts.quantities.registry import unit_of
+from mbma_tables.contacts.question import PRESCRIBED
 from mbma_tables.design.specimen import Specimen
 
 if TYPE_CHECKING:
@@ -216,7 +217,7 @@ def sensitivity_command(
     from mbma_tables.contacts.question import name_of_the_given
     from mbma_tables.design.sensitivity import sensitivity
 
-    given = dict.fromkeys(options.LOADS) | {
+    given = dict.fromkeys(PRESCRIBED) | {
         name: values[0] if len(values) == 1 else values for name, values in loads.items()
     }
     model = model.of(specimen.surface, name_of_the_given(given))

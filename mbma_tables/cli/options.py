@@ -15,6 +15,7 @@ import click
 from mbma_tables.bodies.bodies import Bodies
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import KINDS
+from mbma_tables.contacts.question import PRESCRIBED
 from mbma_tables.design import specimen as specimens
 from mbma_tables.design.specimen import Specimen
 from mbma_tables.islands.island_models import ISLAND_MODELS
@@ -26,7 +27,6 @@ from mbma_tables.theories import THEORIES
 from mbma_tables.theories.named import OF_MAPS
 from mbma_tables.theories.simulated.grids import GRIDS
 
-LOADS = ("separation", "mean_separation", "pressure", "area")
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 DEFAULT_RTOL = 1e-8
@@ -597,7 +597,7 @@ plot_option = _option(
 
 # headings of help, and the options below them; others are below "Options"
 _SECTIONS = {
-    "What is known": LOADS,
+    "What is known": PRESCRIBED,
     "Surface": ("surface", "file", "map"),
     "Measured map": (*specimens.MAP_OPTIONS, "model"),
     "Surface in numbers": (

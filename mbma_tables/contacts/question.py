@@ -13,6 +13,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units
 
 GAPS = ("separation", "mean_separation")
+PRESCRIBED = (*GAPS, "pressure", "area")  # one of which a contact is asked at
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

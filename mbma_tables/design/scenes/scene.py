@@ -25,7 +25,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.toml_files import check, read_toml
 from mbma_tables.common.units import require_surface
 from mbma_tables.contacts.quantities.registry import registry
-from mbma_tables.contacts.question import Question
+from mbma_tables.contacts.question import PRESCRIBED, Question
 from mbma_tables.contacts.result import Contact, Setup
 from mbma_tables.design.scenes.plan import LEAKAGE, Plan, make_plan
 from mbma_tables.design.specimen import from_tables, refuse_joint, schema
@@ -199,8 +199,8 @@ class Scene:
     @property
     def candidates(self) -> dict[str, Any]:
         """What is given of the four quantities of which one is prescribed."""
-        names = ("separation", "mean_separation", "pressure", "area")
-        return {n: getattr(self, n) for n in names if getattr(self, n) is not None}
+        given = {name: getattr(self, name) for name in PRESCRIBED}
+        return {name: value for name, value in given.items() if value is not None}
 
     def _checked_question(self) -> Question | None:
         """The prescribed quantity with its numbers, a row; None if nothing needs it."""
@@ -214,9 +214,8 @@ class Scene:
                 f"{next(iter(given))} is not needed for profiles: leave it out, or give "
                 "quantities"
             )
-        fields = ("separation", "mean_separation", "pressure", "area")
         question = Question.of(
-            self.in_units.units, {name: getattr(self, name) for name in fields}
+            self.in_units.units, {name: getattr(self, name) for name in PRESCRIBED}
         )
         name, numbers = question.name, question.value
         if np.ndim(numbers) > 1:
