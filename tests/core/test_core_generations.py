@@ -59,8 +59,11 @@ def test_with_each_generation(generation):
     passed(QUICK + MORE, MBMA_TABLES_CORE=generation)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="LD_PRELOAD")
-def test_under_sanitizers(tmp_path):
+@pytest.fixture
+def sanitized(tmp_path):
+    """Environment in which the library's core is one compiled with sanitizers, and its folder."""
+    if sys.platform != "linux":
+        pytest.skip("LD_PRELOAD")
     package = tmp_path / "mbma_tables"
     shutil.copytree(
         CORE.parent, package, ignore=shutil.ignore_patterns("__pycache__", "_plain.*")
@@ -86,31 +89,38 @@ def test_under_sanitizers(tmp_path):
         package / "core" / "_plain.abi3.so",
         "-lm",
     )
-    library = run(cc, "-print-file-name=libasan.so").strip()
     # Python itself keeps what it has allocated
-    sanitizer = {
-        "LD_PRELOAD": library,
+    environment = {
+        "LD_PRELOAD": run(cc, "-print-file-name=libasan.so").strip(),
         "ASAN_OPTIONS": "detect_leaks=0",
         "MBMA_TABLES_CORE": "plain",
+        "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]),
     }
-    paths = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
-    said = run(
+    imported = run(
         *(sys.executable, "-P", "-c", "from mbma_tables.core import core; print(core.__file__)"),
-        env=os.environ | sanitizer | {"PYTHONPATH": paths}, cwd=tmp_path,
+        env=os.environ | environment, cwd=tmp_path,
     )  # fmt: skip
-    assert said.startswith(str(package))
-    passed(QUICK, PYTHONPATH=paths, **sanitizer)
-    calls = recording(tmp_path)
+    assert imported.startswith(str(package))
+    return environment, tmp_path
+
+
+def test_under_sanitizers(sanitized):
+    environment, _ = sanitized
+    passed(QUICK, **environment)
+
+
+def test_spoiled_calls_under_sanitizers(sanitized):
+    environment, folder = sanitized
+    calls = recording(folder)
     script = ROOT / "tests" / "core" / "mutate.py"
-    exact = {"PYTHONMALLOC": "malloc", "PYTHONPATH": paths}
     tried = json.loads(
         run(
             sys.executable,
             script,
             calls,
             "100",
-            env=os.environ | sanitizer | exact,
-            cwd=tmp_path,
+            env=os.environ | environment | {"PYTHONMALLOC": "malloc"},
+            cwd=folder,
         )
     )
     assert set(tried) == {name for name, _ in functions()} | {"Law"}
