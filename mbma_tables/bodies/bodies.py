@@ -151,7 +151,7 @@ class Bodies:
         """The effective modulus of Young's moduli, or a check that the one given is theirs."""
         if self.nu is None:
             raise InputError("E needs nu, Poisson's ratio of each body")
-        if np.shape(self.E) != (2,) or np.shape(self.nu) != (2,):
+        if not (_is_pair(self.E) and _is_pair(self.nu)):
             raise InputError(
                 "E and nu are two each, one of each body: E=('210 GPa', '70 GPa'), "
                 f"nu=(0.3, 0.33), got E={self.E!r} and nu={self.nu!r}"
@@ -267,6 +267,13 @@ def checked_largest(pressure: Any) -> FloatArray:
 def is_array(value: Any) -> bool:
     """Whether a constant is an array of any kind or a list, not one number or text."""
     return isinstance(value, list | tuple) or getattr(value, "ndim", 0) > 0
+
+
+def _is_pair(value: Any) -> bool:
+    """Whether a constant is two numbers or texts, one of each body."""
+    if not is_array(value) or len(value) != 2:
+        return False
+    return not any(map(is_array, value))
 
 
 def names_metals(given: Any) -> bool:

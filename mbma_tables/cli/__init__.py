@@ -28,6 +28,7 @@ INTERRUPTED = 130  # as shells report Ctrl-C
 # remedies for Python, in a shell
 REMEDIES = {
     "surface.fit()": "--model self-affine",
+    "Joint and uncertainty take": "mbma contact, joint and batch take",
     "outside='exact'": "--island-model exact",
     "outside='nan'": "--outside nan",
     "give the surface its unit": "give --length-unit",

@@ -12,6 +12,7 @@ import numpy as np
 from mbma_tables.cli import options
 from mbma_tables.cli.format import Report, column_unit, columns_of, report_answer, to_json
 from mbma_tables.common.arguments import finite_array
+from mbma_tables.common.distributions import distribution_of
 from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.common.progress import echo
 from mbma_tables.contacts.quantities.registry import unit_of
@@ -53,15 +54,17 @@ def _resolution(pressed: Any) -> list[str]:
 @options.leakage_option
 @options.columns_option
 @options.conductivity_option
-@options.specimen_options
+@options.draws_options
+@options.optional_specimen_options
 @options.theory_options
 @options.output_options
 def contact_command(
-    loads: dict[str, list[float | str]],
+    loads: dict[str, list[Any]],
     leakage: bool,
     quantity: list[str] | None,
-    conductivity: list[float | str] | None,
-    specimen: Specimen,
+    conductivity: list[Any] | None,
+    drawn: dict[str, Any],
+    specimen: dict[str, Any],
     model: options.Model,
     output: options.Output,
 ) -> None:
@@ -70,16 +73,49 @@ def contact_command(
     Plain numbers are in the units of the surface and of the modulus, "0.8um" is converted
     to them. Force is F/(A0 E*), or F/A0 where a modulus is given; area is A/A0.
 
+    At a pressure any number may be a range, '0.25..2.5 mm', a mean with its deviation,
+    '1.6 um +- 0.2 um', or measured values, '{measured = ["1.5 um", "1.7 um"]}': the table
+    then has medians with quantiles 5% and 95%, and lines above it the shares of inputs.
+
     Example: mbma contact --surface challenge --E-star 25MPa --length-unit mm -p 100kPa
+
+    Example: mbma contact --Ra '1.6 um +- 0.2 um' --hurst 0.8 --longest 0.8mm --shortest 8um
+    --nominal-area 4cm^2 --E-star 115GPa --hardness 2..3GPa -p 10MPa
     """
     if len(loads) != 1:
         raise InputError(
             "one of --separation, --mean-separation, --pressure and --area is needed"
         )
     ((name, numbers),) = loads.items()
-    model = model.of(specimen.surface, name)
+    from mbma_tables.cli.format import quantiles_of_surface
+    from mbma_tables.cli.ranges import quantiles_of, typed_of
+
+    typed = typed_of(specimen, model, conductivity)
+    central = typed.central
+    model = model.of(central.surface, name)
+    if typed.has_range or any(distribution_of(name, each) for each in numbers):
+        if leakage:
+            raise InputError("--leakage is of known numbers: --quantity flow_coefficient")
+        found = quantiles_of(typed, loads, model, quantity or (), drawn)
+        quantiles_of_surface("contact", central, model.theory.name, found).write(output)
+        return
+    if drawn:
+        raise InputError("--draws and --seed are of numbers that are ranges, and none is")
+    _contact_of(central, name, numbers, (leakage, quantity, conductivity), model, output)
+
+
+def _contact_of(
+    specimen: Specimen,
+    name: str,
+    numbers: list[float | str],
+    columns: tuple[bool, list[str] | None, list[float | str] | None],
+    model: options.Model,
+    output: options.Output,
+) -> None:
+    """Write the contact of known numbers."""
     from mbma_tables.contacts.contact import contact
 
+    leakage, quantity, conductivity = columns
     load = {name: finite_array(name, specimen.units.number(name, numbers))}
     pressed = contact(
         specimen.surface,

@@ -30,6 +30,7 @@ from mbma_tables.surfaces.surface import assumptions
 
 if TYPE_CHECKING:
     from mbma_tables.contacts.result import Contact
+    from mbma_tables.design.uncertainty import Uncertainty
 
 DIGITS = 6  # significant digits of a table; JSON and CSV keep all
 # how the meaning of a model uncertainty begins
@@ -260,6 +261,66 @@ def _scatter(answer: Contact) -> tuple[list[str], dict[str, Any]]:
     if any(np.isfinite(values).any() for values in scatter.values()):
         notes.append(f"scatter of {meanings}: {ranges}")
     return notes, {name: np.ravel(values).tolist() for name, values in scatter.items()}
+
+
+def report_of_quantiles(
+    command: str,
+    title: str,
+    notes: Sequence[str],
+    facts: Mapping[str, Any],
+    found: Uncertainty,
+) -> Report:
+    """The report of numbers that are ranges: medians and quantiles of quantities, and shares of inputs."""
+    values: dict[str, Any] = {"pressure": found.pressure}
+    units = {"pressure": column_unit(found.units["pressure"])}
+    for name, (low, median, high) in found.quantiles.items():
+        ends = {f"{name}_low": low, f"{name}_high": high}
+        values |= {name: median} | ends
+        units |= dict.fromkeys((name, *ends), column_unit(found.units[name]))
+    values["valid"] = np.where(found.valid, "yes", "no")
+    of_draws = [
+        f"median of {found.draws} draws (seed {found.seed}); low and high: quantiles "
+        "5% and 95%, of inputs and model"
+    ]
+    for k, at in enumerate(found.pressure.tolist()):
+        place = f"{at:.4g} {units['pressure']}".removesuffix(" -")
+        of_draws += [
+            f"shares in {name} at {place}: {found.shares_text(name, k)}"
+            for name in found.quantiles
+        ]
+    of_draws += [f"not valid over the whole range: {reason}" for reason in found.reasons]
+    shares = {
+        quantity: {name: share.tolist() for name, share in of.items()}
+        for quantity, of in found.shares.items()
+    }
+    facts_of_draws = {
+        "draws": found.draws,
+        "seed": found.seed,
+        "shares": shares,
+        "valid": found.valid.tolist(),
+        "reasons": list(found.reasons),
+    }
+    return Report(
+        command, title, [*notes, *of_draws], {**facts, **facts_of_draws}, values, units
+    )
+
+
+def quantiles_of_surface(
+    command: str, specimen: Specimen, theory: str, found: Uncertainty
+) -> Report:
+    """The report of a surface and bodies of which numbers are ranges; the specimen is that of the medians."""
+    facts, notes = _surface_facts(specimen)
+    typed = [f"{name}: {each.text}" for name, each in found.inputs.items()]
+    notes = [f"{notes[0]}, of the middle of each range", *notes[1:], *typed]
+    notes.append(f"theory {theory}")
+    texts = {name: each.text for name, each in found.inputs.items()}
+    return report_of_quantiles(
+        command,
+        specimen.title,
+        notes,
+        {"theory": theory, "surface": facts, "inputs": texts},
+        found,
+    )
 
 
 def report_answer(

@@ -15,6 +15,7 @@ import click
 from mbma_tables.bodies.bodies import Bodies
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import KINDS
+from mbma_tables.common.toml_files import value_of
 from mbma_tables.contacts.question import PRESCRIBED
 from mbma_tables.design import specimen as specimens
 from mbma_tables.design.specimen import Specimen
@@ -107,10 +108,13 @@ def _output(given: Mapping[str, Any]) -> Output:
 
 
 def _parse_number(ctx: click.Context, param: click.Parameter, given: Any) -> Any:
-    """A number, or a number with its unit as text, which is converted later."""
+    """A number, or a number with its unit or a range as text, which is converted later."""
     try:
         return None if given is None else float(given)
     except ValueError:
+        if given.lstrip().startswith("{"):
+            # measured values, as a file has them
+            return value_of(given)
         if not given.strip().startswith(tuple("+-.0123456789")):
             raise click.BadParameter(
                 f"{given!r} is not a number, nor one with its unit.", ctx, param
@@ -124,11 +128,9 @@ def _parse_numbers(
     """All numbers of a repeated option, with commas between them; None where it was not given."""
     numbers: list[Any] = []
     for text in given:
-        numbers += (
-            [_parse_number(ctx, param, part) for part in text.split(",")]
-            if text.strip()
-            else []
-        )
+        is_measured = text.lstrip().startswith("{")
+        parts = [text] if is_measured else text.split(",") if text.strip() else []
+        numbers += [_parse_number(ctx, param, part) for part in parts]
     return numbers if given else None
 
 
@@ -175,22 +177,33 @@ def given_values(values: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def specimen_of(given: Mapping[str, Any]) -> Specimen:
-    """The surface that the options describe, with its modulus; a modulus option overrides that of a file."""
-    length = given["length_unit"]
-    stress = given["stress_unit"]
+def surface_in(given: Mapping[str, Any]) -> dict[str, Any]:
+    """What options have of a surface without a file; an error for none and for several."""
     known = (*specimens.NUMBERS, *specimens.MAP_OPTIONS, "map", "model")
     surface = given_values(
         {"name": given["surface"]} | {name: given[name] for name in known}
     )
-    material = given_values({name: given[name] for name in specimens.MATERIAL})
     if (given["file"] is None) == (not surface):
         got = ", ".join(["file"] * (given["file"] is not None) + list(surface)) or "none"
         raise InputError(
             f"one surface is needed: --surface NAME, --file TOML, --map MAP, or its numbers; got {got}"
         )
+    return surface
+
+
+def specimen_of(
+    given: Mapping[str, Any], entries: Mapping[str, Any] | None = None
+) -> Specimen:
+    """The surface that the options describe, with its modulus; a modulus option overrides that of a file.
+
+    `entries` are those of the file, if it was read.
+    """
+    length = given["length_unit"]
+    stress = given["stress_unit"]
+    surface = surface_in(given)
+    material = given_values({name: given[name] for name in specimens.MATERIAL})
     if given["file"] is not None:
-        specimen = specimens.read_specimen(given["file"])
+        specimen = specimens.read_specimen(given["file"], entries)
     else:
         tables = {"surface": surface | {"length_unit": length}}
         specimen = specimens.from_tables(tables, Path(), "surface given by numbers")
@@ -209,6 +222,8 @@ def _option(name: str, help: str, **kind: Any) -> Decorator:
     return click.option(flag, name.partition("/")[0], help=help, **kind)
 
 
+# of a number without a unit, or a range of them
+_NUMBER: dict[str, Any] = {"callback": _parse_number, "metavar": "X"}
 PATH: Any = click.Path(path_type=Path)
 # options of `MAP_OPTIONS`, named as in `mbma_tables.surfaces.treatment.Treatment`
 _MAP_OPTIONS = (
@@ -290,14 +305,14 @@ _SPECIMEN_OPTIONS = (
         "Of a map: its own spectrum, or five numbers.",
         type=click.Choice(("measured", "self-affine")),
     ),
-    _option("hurst", "Surface in numbers: Hurst exponent, in (0, 1].", type=float),
+    _option("hurst", "Surface in numbers: Hurst exponent, in (0, 1].", **_NUMBER),
     _option("q0", "Smallest wavenumber [1/length]."),
     _option("q1", "Largest wavenumber [1/length]; or give --zeta-1."),
-    _option("zeta_1", "Largest magnification q1/q0, above 3.", type=float),
+    _option("zeta_1", "Largest magnification q1/q0, above 3.", **_NUMBER),
     _option("h_rms", "Root-mean-square height [length]."),
     _option("h_max", "Highest point above the mid-plane [length]."),
     _option("m0", "Surface by moments: hurst, h_max, variance of height [length^2],"),
-    _option("m2", "variance of a profile's slope,", type=float),
+    _option("m2", "variance of a profile's slope,", **_NUMBER),
     _option("m4", "variance of a profile's second derivative [1/length^2]."),
     *_ROUGHNESS_OPTIONS,
     _option(
@@ -305,9 +320,9 @@ _SPECIMEN_OPTIONS = (
         "Effective modulus; export needs one, elsewhere forces are over E* without it.",
     ),
     _option("E1", "Instead of --E-star: Young's modulus,"),
-    _option("nu1", "and Poisson's ratio of one body,", type=float),
+    _option("nu1", "and Poisson's ratio of one body,", **_NUMBER),
     _option("E2", "Young's modulus of the other,"),
-    _option("nu2", "and its Poisson's ratio.", type=float),
+    _option("nu2", "and its Poisson's ratio.", **_NUMBER),
     length_unit(),
     stress_unit_option,
 )
@@ -570,6 +585,15 @@ output_options = option_group(
         help="Print CSV with '#' comments instead of a table.",
     ),
     _option("out", "Write to a file instead.", type=PATH, metavar="FILE"),
+)
+# of numbers that are ranges
+draws_options = option_group(
+    "drawn",
+    given_values,
+    click.option(
+        "--draws", type=int, help="Of numbers that are ranges; 2000 by default."
+    ),
+    click.option("--seed", type=int, help="Of their random numbers; 0 by default."),
 )
 leakage_option = _option(
     "leakage", "Add the flow coefficient of the gaps [length^3].", is_flag=True

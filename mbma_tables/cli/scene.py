@@ -8,20 +8,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from mbma_tables.cli.export import write_export
 from mbma_tables.cli.format import (
     Report,
     assumption_notes,
-    column_unit,
     columns_of,
+    report_of_quantiles,
     to_json,
     validity_of,
 )
 from mbma_tables.cli.options import (
     Output,
     check_plot,
+    draws_options,
     face_options,
     file_options,
     given_values,
@@ -275,47 +275,18 @@ def _report_of_ranges(
     joint: Joint, pressures: list[Any], title: str, drawn: dict[str, Any]
 ) -> Report:
     """Medians and quantiles of a joint with ranges, with the shares of its inputs."""
+    from mbma_tables.design.uncertainty import LOAD
+
     found = joint.uncertainty(pressures, **drawn)
-    values: dict[str, Any] = {"pressure": found.pressure}
-    units = {"pressure": found.units["pressure"]}
-    for name, (low, median, high) in found.quantiles.items():
-        ends = {f"{name}_low": low, f"{name}_high": high}
-        values |= {name: median} | ends
-        units |= dict.fromkeys((name, *ends), column_unit(found.units[name]))
-    values["valid"] = np.where(found.valid, "yes", "no")
     facts = joint.facts()
     assumed = [f"{name} {text}" for name, text in joint.assumed.items()]
     assumed += assumptions(joint.surface)
     notes = [f"{name}: {text}" for name, text in facts.items() if name != "assumed"]
     notes += assumption_notes(assumed)
-    notes.append(
-        f"median of {found.draws} draws (seed {found.seed}); low and high: quantiles "
-        "5% and 95%, of inputs and model"
-    )
-    for k, at in enumerate(found.pressure.tolist()):
-        notes += [
-            f"shares in {name} at {at:.4g} {units['pressure']}: {found.shares_text(name, k)}"
-            for name in found.quantiles
-        ]
-    notes += [f"not valid over the whole range: {reason}" for reason in found.reasons]
-    shares = {
-        quantity: {name: share.tolist() for name, share in of.items()}
-        for quantity, of in found.shares.items()
-    }
-    facts_of_draws = {
-        "draws": found.draws,
-        "seed": found.seed,
-        "shares": shares,
-        "valid": found.valid.tolist(),
-        "reasons": list(found.reasons),
-    }
-    return Report(
-        "joint",
-        title,
-        notes,
-        {**facts, "assumed": assumed, **facts_of_draws},
-        values,
-        units,
+    if LOAD in found.inputs:
+        notes.append(f"{LOAD}: {found.inputs[LOAD].text}")
+    return report_of_quantiles(
+        "joint", title, notes, {**facts, "assumed": assumed}, found
     )
 
 
@@ -337,14 +308,7 @@ def _report_of_ranges(
     help="In place of pressures: 40kN, on nominal_area.",
 )
 @plot_option
-@option_group(
-    "drawn",
-    given_values,
-    click.option(
-        "--draws", type=int, help="Of numbers that are ranges; 2000 by default."
-    ),
-    click.option("--seed", type=int, help="Of their random numbers; 0 by default."),
-)
+@draws_options
 @_joint_options
 @file_options
 @output_options
@@ -400,10 +364,12 @@ def joint_command(
             "pressures or forces are needed: --pressure or --force; or --export TARGET"
         )
     check_plot(plot, output.out)
+    from mbma_tables.design.uncertainty import Load
+
     joint = _joint(file, entries)
     title = "joint of options" if file is None else file.name
     pressures = pressure or [joint.pressure_of(each) for each in force]
-    if joint.inputs:
+    if joint.inputs or Load.of(pressures).distributions:
         report = _report_of_ranges(joint, pressures, title, drawn)
         report.write(output, plot, _picture(joint, plot))
         return

@@ -109,6 +109,14 @@ class Distribution:
             return [self.written(each) for each in numbers]
         return f"{float(numbers)!r} {self.unit}"
 
+    def retyped(self, factor: float, unit: str) -> Any:
+        """What would be typed for it times a factor, in another unit."""
+        numbers = [f"{number * factor:.15g}" for number in self.numbers]
+        if self.kind == MEASURED:
+            return {MEASURED: [f"{number} {unit}" for number in numbers]}
+        text = f"{(' +- ' if self.kind == 'normal' else '..').join(numbers)} {unit}"
+        return f"{text} {LOG}" if self.kind == LOG else text
+
 
 def distribution_of(name: str, given: Any) -> Distribution | None:
     """The distribution that was typed for a named number; None for anything else.

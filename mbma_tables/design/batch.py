@@ -232,21 +232,11 @@ class Designs:
         given = {load: entries.pop(load)}
         for face in FACES:
             if isinstance(entries.get(face), Mapping):
-                entries[face] = self._face(entries[face])
+                entries[face] = {**entries[face], "unit": self.units.length}
         joint = Joint.from_entries(entries, self.path)
         if "force" in given:
             return joint, {"pressure": _pressure(joint, given["force"])}
         return joint, given
-
-    def _face(self, part: Mapping[str, Any]) -> Any:
-        """A face by roughness parameters as they are, or the surface of five numbers."""
-        in_unit = {**part, "unit": self.units.length}
-        if "h_rms" not in part:
-            return in_unit
-        try:
-            return Surface(**in_unit)
-        except TypeError as fault:
-            raise InputError(fault) from None
 
 
 def _in_unit_of_results(bodies: Any) -> Any:

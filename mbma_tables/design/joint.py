@@ -36,6 +36,7 @@ from mbma_tables.common.arguments import (
 from mbma_tables.common.display import Displayed, Variable, dataset_of, saved, shown
 from mbma_tables.common.distributions import (
     Distribution,
+    distribution_of,
     distributions_in,
     of_all,
     with_numbers,
@@ -64,6 +65,7 @@ from mbma_tables.design.body_numbers import BodyNumbers
 from mbma_tables.design.derivatives import Described
 from mbma_tables.design.functions import ContactFunction
 from mbma_tables.design.sensitivity import Sensitivity, sensitivity_of
+from mbma_tables.design.specimen import is_of_numbers, surface_of_entries
 from mbma_tables.design.uncertainty import (
     DRAWS,
     LEVELS,
@@ -74,7 +76,6 @@ from mbma_tables.design.uncertainty import (
     bodies_of_entries,
     entries_of_bodies,
     replicas_of,
-    require_inputs,
     uncertainty_of,
 )
 from mbma_tables.design.unknowns import OfOneMap, Unknowns, unknowns_of
@@ -131,8 +132,9 @@ class Joint(JointQuantities, Displayed):
     ----------
     part_a, part_b : Surface or mapping
         Roughness of each part: a surface (from a map, a profile, a spectrum or five
-        numbers); the arguments of `Surface.from_roughness` without a highest point; or
-        those of `Surface.from_map`, with the file under "map". Without `part_b` the other
+        numbers); the arguments of `Surface.from_roughness` without a highest point; those
+        of `Surface` or `Surface.from_moments`; or those of `Surface.from_map`, with the
+        file under "map". Without `part_b` the other
         face is smooth.
     bodies : str, Metal, pair of them, float, or Bodies
         Metals of the parts, from `mbma_tables.bodies.materials.METALS`, or the arguments of
@@ -145,8 +147,8 @@ class Joint(JointQuantities, Displayed):
         A0 [length^2], from which the highest point of Gaussian heights follows (`Surface`);
         needed for parts that are mappings. Without it, surfaces keep their own highest
         point.
-    friction : float, optional
-        Coefficient of friction, for friction cards of solvers.
+    friction : array_like, optional
+        Coefficient of friction, for slip (`Contact.tangential`) and friction cards of solvers.
     direction : {"along", "across"}, optional
         Of the shear relative to the lay, for parts that have one.
     gas : {"air", "helium", "nitrogen", "argon", "vacuum"} or Gas
@@ -162,7 +164,7 @@ class Joint(JointQuantities, Displayed):
         The metals, where they are named.
     inputs : dict
         Numbers that are not known, by place such as "part_a.Ra". Numbers of the parts (not
-        of maps), `nominal_area`, constants of `bodies` and those of the gas may be ranges,
+        of maps), `nominal_area`, `friction`, constants of `bodies` and those of the gas may be ranges,
         "0.25..2.5 mm", means with a standard deviation, "1.6 um +- 0.2 um", or measured
         values, {"measured": ["1.5 um", "1.7 um"]}. Tables and plots then have quantiles, as
         `uncertainty`; `central` is the joint of the medians.
@@ -208,7 +210,7 @@ class Joint(JointQuantities, Displayed):
     _: dataclasses.KW_ONLY
     bodies: Any  # `Bodies` once it is made
     nominal_area: ArrayLike | str | None = None
-    friction: float | None = None
+    friction: Any = None  # ArrayLike or a range
     direction: str | None = None
     gas: str | Gas | Mapping[str, Any] = "air"
     theory: str | Theory | None = None
@@ -233,7 +235,11 @@ class Joint(JointQuantities, Displayed):
             if part is not None or name == "part_a":
                 faces[name] = self._face(name, part)
         object.__setattr__(self, "_faces", faces)
-        drawn = isinstance(self.part_a, Mapping) and "map" not in self.part_a
+        drawn = (
+            isinstance(self.part_a, Mapping)
+            and "map" not in self.part_a
+            and not is_of_numbers(self.part_a)
+        )
         # a face made of numbers has the highest point of the nominal area already
         area = None if drawn and len(faces) == 1 else self.nominal_area
         surface = equivalent(list(faces.values()), area)
@@ -268,7 +274,7 @@ class Joint(JointQuantities, Displayed):
     @property
     def _entries(self) -> dict[str, Any]:
         """What was typed, of which numbers may be distributions."""
-        names = (*FACES, "nominal_area", "gas")
+        names = (*FACES, "nominal_area", "friction", "gas")
         entries = {name: getattr(self, name) for name in names}
         return entries | {"bodies": entries_of_bodies(self.bodies)}
 
@@ -314,12 +320,11 @@ class Joint(JointQuantities, Displayed):
     @property
     def _description(self) -> Description:
         """How contacts are made of drawn numbers."""
-        require_inputs(self.inputs, "the joint")
 
         def make(numbers: Mapping[str, Any]) -> Pressed:
             return self._with(numbers).at_pressure
 
-        return Description(self.inputs, make)
+        return Description(self.inputs, make, "the joint")
 
     def uncertainty(
         self,
@@ -338,7 +343,7 @@ class Joint(JointQuantities, Displayed):
         Parameters
         ----------
         pressure : array_like or str
-            F/A0, one or several, as for `at_pressure`.
+            F/A0, one or several, as for `at_pressure`; any may be a distribution, too.
         draws, quantiles, quantities, seed
             As for `mbma_tables.uncertainty`.
 
@@ -415,6 +420,7 @@ class Joint(JointQuantities, Displayed):
             "temperature": gas.temperature,
             "gas_pressure": gas.pascals,
             "accommodation": gas.accommodation,
+            "friction": self.friction,
         }
         return {name: value for name, value in numbers.items() if value is not None}
 
@@ -454,6 +460,8 @@ class Joint(JointQuantities, Displayed):
                     "nominal_area is of the joint, Joint(part_a, part_b, nominal_area=...), "
                     "in a file above the tables of the parts"
                 )
+            if is_of_numbers(part):
+                return surface_of_entries(part)
             made: AnySurface = Surface.from_roughness(
                 **part, nominal_area=self.nominal_area
             )
@@ -535,7 +543,7 @@ class Joint(JointQuantities, Displayed):
         Parameters
         ----------
         force : float or str
-            "40 kN"; plain numbers in N.
+            "40 kN"; plain numbers in N. Of a range, "30..50 kN", the pressure is a range.
 
         Raises
         ------
@@ -554,7 +562,15 @@ class Joint(JointQuantities, Displayed):
             self.require_known("the pressure of a force")
         if self.nominal_area is None:
             raise InputError("a force needs nominal_area, over which it is the pressure")
-        return force_over_area(force, self.nominal_area, self.surface.unit)
+        known = distribution_of("force", force)
+        if known is None:
+            return force_over_area(force, self.nominal_area, self.surface.unit)
+        one = force_over_area(
+            f"1 {known.unit or 'N'}", self.nominal_area, self.surface.unit
+        )
+        if not isinstance(one, str):
+            raise InputError(f"force = {known.text!r} is of one joint, not of a batch")
+        return known.retyped(float(one.removesuffix(" Pa")), "Pa")
 
     def at_pressure(self, pressure: ArrayLike | str) -> Contact:
         """The contact at pressures F/A0 ("10 MPa"; plain numbers in the unit of the modulus), as of `contact`.

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mbma_tables.bodies.materials import effective_modulus
-from mbma_tables.common.arguments import one_number, require
+from mbma_tables.common.arguments import finite_array, one_number, require
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.netcdf import is_own
 from mbma_tables.common.plain_text import visible
@@ -138,7 +138,9 @@ def from_numbers(
             f"roughness (Rq, ...), with h_max or nominal_area; got {', '.join(given) or 'none of them'}"
         )
     plain, unit = in_one_unit(given, unit)
-    numbers = {key: one_number(key, value) for key, value in plain.items()}
+    numbers: dict[str, Any] = {
+        key: finite_array(key, value)[()] for key, value in plain.items()
+    }
     if "m0" in numbers:
         return Specimen(Surface.from_moments(**numbers, unit=unit), title)
     if "zeta_1" in numbers:
@@ -151,6 +153,20 @@ def from_numbers(
         )
         numbers["q1"] = numbers["q0"] * zeta_1
     return Specimen(Surface(**numbers, unit=unit), title)
+
+
+def is_of_numbers(entries: Mapping[str, Any]) -> bool:
+    """Whether entries of a surface are its five numbers or moments, not those of a drawing."""
+    return "h_rms" in entries or "m0" in entries
+
+
+def surface_of_entries(entries: Mapping[str, Any]) -> AnySurface:
+    """The surface, or the batch, of the arguments of `Surface.from_roughness`, of `Surface` or of `Surface.from_moments`."""
+    if not is_of_numbers(entries):
+        drawn: AnySurface = Surface.from_roughness(**entries)
+        return drawn
+    numbers = dict(entries)
+    return from_numbers(numbers, numbers.pop("unit", None)).surface
 
 
 def effective_modulus_of(
@@ -180,9 +196,12 @@ def refuse_joint(path: pathlib.Path, entries: Mapping[str, Any]) -> None:
         )
 
 
-def read_specimen(path: pathlib.Path) -> Specimen:
-    """The specimen of a TOML file with the table [surface] of a scene, and [material]."""
-    entries = read_toml(path, "surface")
+def read_specimen(
+    path: pathlib.Path, entries: Mapping[str, Any] | None = None
+) -> Specimen:
+    """The specimen of a TOML file with the table [surface] of a scene, and [material]; `entries` if it was read."""
+    if entries is None:
+        entries = read_toml(path, "surface")
     content = schema()
     tables = {
         "surface": content["properties"]["surface"],

@@ -35,10 +35,10 @@ from mbma_tables.contacts.contact import contact
 from mbma_tables.contacts.quantities import registry
 from mbma_tables.contacts.quantities.declaration import DIMENSIONLESS
 from mbma_tables.contacts.result import Contact, panel_label
+from mbma_tables.design.specimen import surface_of_entries
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.drawing import entries_of, with_area
 from mbma_tables.surfaces.roughness import spread_of_processes
-from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.base import Theory, UserTheory
 
 if TYPE_CHECKING:
@@ -61,7 +61,47 @@ SPREADS = {
     "total_conductance_scatter": "stiffness",
     "gas_conductance_scatter": "gap",
 }
+LOAD = "pressure"  # the name of the share of pressures that are ranges
 Pressed = Callable[[Any], Contact]
+
+
+@dataclasses.dataclass(frozen=True)
+class Load:
+    """Pressures of which any may be a distribution; one level draws all of them together."""
+
+    given: list[Any]
+    distributions: dict[int, Distribution]  # by their place
+
+    @classmethod
+    def of(cls, pressure: Any) -> Load:
+        """One pressure or several, as they were typed."""
+        is_one = isinstance(pressure, Mapping)
+        given = [pressure] if is_one else np.asarray(pressure, dtype=object)
+        entries = np.atleast_1d(np.asarray(given, dtype=object)).tolist()
+        found = {k: distribution_of(LOAD, each) for k, each in enumerate(entries)}
+        return cls(entries, {k: each for k, each in found.items() if each is not None})
+
+    @property
+    def inputs(self) -> dict[str, Distribution]:
+        """The distribution of the first pressure that is one, with the text of all."""
+        if not self.distributions:
+            return {}
+        several = list(self.distributions.values())
+        text = ", ".join(each.text for each in several)
+        return {LOAD: dataclasses.replace(several[0], text=text)}
+
+    def at(self, level: float) -> list[Any]:
+        """The pressures at a level of their distributions, as they would be typed."""
+        pressures = list(self.given)
+        for k, each in self.distributions.items():
+            pressures[k] = each.written(float(each.quantile(level)))
+        return pressures
+
+    def at_all(self, levels: FloatArray) -> list[Any]:
+        """A row of pressures for each level, or the pressures themselves where all are known."""
+        if not self.distributions:
+            return self.given
+        return [self.at(level) for level in levels.tolist()]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,11 +111,36 @@ class Description:
     inputs: Mapping[str, Distribution]  # by place, such as "part_a.Ra"
     #: the contact at pressures, from what is typed in place of the inputs; arrays are batches
     make: Callable[[Mapping[str, Any]], Pressed]
+    what: str = "the contact"
+
+    def with_load(self, load: Load) -> Description:
+        """The same with pressures that are distributions as the last input."""
+        inputs = {**self.inputs, **load.inputs}
+        require_inputs(inputs, self.what)
+        return dataclasses.replace(self, inputs=inputs)
 
     def levels(self, draws: int, seed: int) -> FloatArray:
-        """Uniform numbers of each draw, for the inputs and the model; the first draws are the same for any number of them."""
+        """Uniform numbers of each draw, for the inputs, the model and the load.
+
+        The first draws are the same for any number of them, and whether or not the load is
+        a distribution.
+        """
         generator = np.random.default_rng(seed)
-        return generator.random((draws, len(self.inputs) + 1))
+        own = len(self.inputs) - (LOAD in self.inputs)
+        levels = generator.random((draws, own + 1))
+        of_load = np.random.default_rng([seed, 1]).random((draws, 1))
+        return np.concatenate([levels, of_load], axis=1)
+
+    def of_inputs(self, levels: FloatArray) -> FloatArray:
+        """Levels of the inputs alone, in their order."""
+        own = len(self.inputs) - (LOAD in self.inputs)
+        if LOAD not in self.inputs:
+            return levels[:, :own]
+        return np.delete(levels, own, axis=1)
+
+    def of_model(self, levels: FloatArray) -> FloatArray:
+        """Levels of the model's error."""
+        return levels[:, -2]
 
     def drawn(self, levels: FloatArray) -> dict[str, FloatArray]:
         """Numbers of the inputs at levels, rows of draws."""
@@ -99,6 +164,7 @@ class _Evaluated:
     """Quantities of contacts in rows of draws, at pressures."""
 
     central: Contact  # by which names and units are known
+    drawn: dict[str, FloatArray]  # numbers of the inputs
     values: dict[str, FloatArray]  # (rows, pressures)
     scatter: dict[str, FloatArray]  # of ln of the values; NaN where not known
     valid: NDArray[np.bool_]
@@ -128,14 +194,19 @@ def relative_scatter(pressed: Contact, name: str) -> Any:
     return declared.error_sign * scatter
 
 
+def names_by_default(pressed: Contact) -> list[str]:
+    """Names of the quantities that have a model uncertainty at a pressure."""
+    return [
+        name
+        for name in registry.results()
+        if name != LOAD and registry.get(name).is_shown(pressed)
+    ]
+
+
 def _names(pressed: Contact, quantities: Sequence[str] | None) -> list[str]:
     """Names of the quantities that are asked for, or that have a model uncertainty at a pressure."""
     if quantities is None:
-        return [
-            name
-            for name in registry.results()
-            if name != "pressure" and registry.get(name).is_shown(pressed)
-        ]
+        return names_by_default(pressed)
     if isinstance(quantities, str) or not quantities:
         raise InputError(f"quantities are a list of names, got {quantities!r}")
     for name in quantities:
@@ -145,22 +216,25 @@ def _names(pressed: Contact, quantities: Sequence[str] | None) -> list[str]:
 
 def _evaluated(
     description: Description,
-    drawn: Mapping[str, FloatArray],
-    pressures: Any,
+    levels: FloatArray,
+    load: Load,
     quantities: Sequence[str] | None,
 ) -> _Evaluated:
     """The contacts of all draws: one batch, or one after the other where the batch is refused."""
     inputs = description.inputs
-    central = description.make(of_all(inputs, lambda each: each.median))(pressures)
+    medians = of_all(inputs, lambda each: each.median)
+    central = description.make(medians)(load.at(0.5))
     names = _names(central, quantities)
+    drawn = description.drawn(levels)
     typed = {name: inputs[name].written(rows[:, None]) for name, rows in drawn.items()}
-    rows = next(iter(drawn.values())).size
+    pressures = load.at_all(levels[:, -1])
     try:
         pressed = description.make(typed)(pressures)
-        batches = [_of_contact(pressed, names, (rows, np.size(pressures)))]
+        batches = [_of_contact(pressed, names, (len(levels), len(load.given)))]
     except InputError:
         # a number out of range is refused again there
-        batches = list(_one_by_one(description, typed, pressures, names))
+        rows = [load.at(level) for level in levels[:, -1].tolist()]
+        batches = list(_one_by_one(description, typed, rows, names))
     reasons: dict[str, NDArray[np.bool_]] = {}
     for part in batches:
         for reason, mask in part[3].items():
@@ -171,6 +245,7 @@ def _evaluated(
     )
     return _Evaluated(
         central,
+        drawn,
         {name: np.concatenate([each[name] for each in values]) for name in names},
         {name: np.concatenate([each[name] for each in scatter]) for name in names},
         np.concatenate(valid),
@@ -205,17 +280,16 @@ def _of_contact(pressed: Contact, names: Sequence[str], shape: tuple[int, int]) 
 def _one_by_one(
     description: Description,
     typed: Mapping[str, Any],
-    pressures: Any,
+    loads: Sequence[list[Any]],
     names: Sequence[str],
 ) -> Iterator[_Batch]:
     """The draws one after the other, where their contacts make no batch."""
-    rows = len(next(iter(typed.values())))
     with shown("draws"):
-        for k in range(rows):
-            doing(f"draw {k + 1} of {rows}")
+        for k, pressures in enumerate(loads):
+            doing(f"draw {k + 1} of {len(loads)}")
             one = {name: entries[k][0] for name, entries in typed.items()}
             pressed = description.make(one)(pressures)
-            yield _of_contact(pressed, names, (1, np.size(pressures)))
+            yield _of_contact(pressed, names, (1, len(pressures)))
 
 
 def _standard_normal(levels: FloatArray) -> FloatArray:
@@ -461,13 +535,15 @@ def uncertainty_of(
     whole_number_in("draws", draws, 100, MOST_DRAWS)
     whole_number_in("seed", seed, 0, 2**63 - 1)
     levels = _checked_levels(quantiles)
-    pressures = np.atleast_1d(np.asarray(pressure, dtype=object)).tolist()
+    load = Load.of(pressure)
+    description = description.with_load(load)
     uniform = description.levels(draws, seed)
     corners = description.corners()
     # corners first: where one is refused, no draws are made in vain
-    drawn = description.drawn(np.concatenate([corners, uniform[:, :-1]]))
-    evaluated = _evaluated(description, drawn, pressures, quantities)
-    error = _standard_normal(uniform[:, -1])
+    of_inputs = np.concatenate([corners, description.of_inputs(uniform)])
+    evaluated = _evaluated(description, of_inputs, load, quantities)
+    error = _standard_normal(description.of_model(uniform))
+    drawn = evaluated.drawn
     columns = {name: rows[-draws:] for name, rows in drawn.items()} | {MODEL: error}
     bands = {}
     logarithms = []
@@ -481,7 +557,7 @@ def uncertainty_of(
     fitted = _shares(columns, np.concatenate(logarithms, axis=1))
     shares = {}
     for k, name in enumerate(bands):
-        own = slice(k * len(pressures), (k + 1) * len(pressures))
+        own = slice(k * len(load.given), (k + 1) * len(load.given))
         shares[name] = {of: share[own] for of, share in fitted.items()}
         scatter = evaluated.scatter[name][-draws:]
         is_stated = np.isfinite(scatter).all(axis=0)
@@ -516,9 +592,15 @@ class Replica:
     inputs: dict[str, Any]
     model: float
     _pressed: Pressed
+    _level_of_load: float
 
     def at_pressure(self, pressure: ArrayLike | str) -> ReplicaContact:
-        """The contact of this draw at pressures, as of `Joint.at_pressure`."""
+        """The contact of this draw at pressures, as of `Joint.at_pressure`; of a range it has its own draw."""
+        load = Load.of(pressure)
+        if load.distributions:
+            drawn = load.at(self._level_of_load)
+            is_one = isinstance(pressure, str | Mapping)
+            pressure = drawn[0] if is_one else drawn
         return ReplicaContact(self._pressed(pressure), self.model)
 
 
@@ -553,16 +635,18 @@ def replicas_of(description: Description, n: int, seed: int = 0) -> list[Replica
     """Draws of a description, the first ones of `uncertainty_of` with this seed."""
     whole_number_in("n", n, 1, MOST_DRAWS)
     whole_number_in("seed", seed, 0, 2**63 - 1)
+    require_inputs(description.inputs, description.what)
     uniform = description.levels(n, seed)
-    drawn = description.drawn(uniform[:, :-1])
-    errors = _standard_normal(uniform[:, -1])
+    drawn = description.drawn(description.of_inputs(uniform))
+    errors = _standard_normal(description.of_model(uniform))
     made = []
     for k, error in enumerate(errors.tolist()):
         numbers = {
             name: each.written(float(drawn[name][k]))
             for name, each in description.inputs.items()
         }
-        made.append(Replica(numbers, error, description.make(numbers)))
+        level = float(uniform[k, -1])
+        made.append(Replica(numbers, error, description.make(numbers), level))
     return made
 
 
@@ -572,8 +656,8 @@ def _described(
     """The contact of a surface and bodies, of which numbers may be distributions."""
     if not isinstance(surface, Mapping | AnySurface):
         raise InputError(
-            "surface is a Surface, or the arguments of Surface.from_roughness by name, "
-            f"got {surface!r}"
+            "surface is a Surface, or by name the arguments of Surface.from_roughness, of "
+            f"Surface or of Surface.from_moments, got {surface!r}"
         )
     surface, assumed = entries_of(surface)
     if assumed:
@@ -584,7 +668,7 @@ def _described(
         entries = with_numbers(given, numbers)
         face = entries["surface"]
         if isinstance(face, Mapping):
-            face = Surface.from_roughness(**face)
+            face = surface_of_entries(face)
         pair = bodies_of_entries(bodies, entries["bodies"])
 
         def pressed(pressure: Any) -> Contact:
@@ -592,9 +676,7 @@ def _described(
 
         return pressed
 
-    inputs = dict(distributions_in(given))
-    require_inputs(inputs, "the contact")
-    return Description(inputs, make)
+    return Description(dict(distributions_in(given)), make)
 
 
 def entries_of_bodies(bodies: Any) -> Any:
@@ -637,13 +719,13 @@ def uncertainty(
     Parameters
     ----------
     surface : Surface or mapping
-        A surface, or the arguments of `Surface.from_roughness` by name, of which any number
-        may be a range "0.25..2.5 mm", a mean and its standard deviation "1.6 um +- 0.2 um",
+        A surface, or by name the arguments of `Surface.from_roughness`, of `Surface` or of
+        `Surface.from_moments`, of which any number may be a range "0.25..2.5 mm", a mean and its standard deviation "1.6 um +- 0.2 um",
         or a mapping of measured values, {"measured": ["1.5 um", "1.7 um"]}.
     bodies : Bodies, mapping, float or str
         As for `contact`; constants of `Bodies` may be such texts, too.
     pressure : array_like or str
-        F/A0, one or several, as for `contact`.
+        F/A0, one or several, as for `contact`; any may be a distribution, too.
     theory : str or theory, optional
         As for `contact`.
     draws : int

@@ -424,7 +424,7 @@ def test_effects_that_are_not_called_for_cost_nothing(joint, monkeypatch):
         ({"theory": "calibratd"}, "did you mean 'calibrated'"),
         ({"theory": "simulated"}, "is of one map"),
         ({"theory": 5}, "theory must be one of"),
-        ({"friction": -0.2}, "friction must be a number"),
+        ({"friction": -0.2}, "friction must be positive"),
         ({"bodies": Bodies(metals=METALS, hardness="60 HRB")}, "from 71.2 to 99.5"),
         ({"bodies": Bodies(metals=METALS, hardness=-1.0)}, "hardness must be positive"),
         ({"direction": "alon"}, "direction must be one of"),

@@ -467,3 +467,182 @@ def test_options_of_a_face_stand_for_a_file():
 )
 def test_settings_and_ranges_of_the_command_are_checked(words, message):
     assert message in refused("joint", *words)
+
+
+def plain_joint(**changed):
+    entries = {"part_a": FACE | {"Ra": "0.4 um"}, "bodies": METALS}
+    return Joint(**entries | {"nominal_area": "4 cm^2"} | changed)
+
+
+def test_pressures_may_be_ranges_and_are_drawn_with_everything_else():
+    """As a direct Monte Carlo has it; a replica's own draw of the load is that of the quantiles."""
+    joint = plain_joint()
+    found = joint.uncertainty(["8..12 MPa", "50 MPa"], quantities=["area"])
+    rng = np.random.default_rng(5)
+    pressed = joint.at_pressure(rng.uniform(0.008, 0.012, 20_000))
+    table = pressed.area * np.exp(rng.standard_normal(20_000) * pressed.area_scatter)
+    for level, quantile in zip(found.levels, found.quantiles["area"][:, 0], strict=True):
+        sampling = np.sqrt(level * (1 - level) * (1 / found.draws + 1 / table.size))
+        assert abs(np.mean(table < quantile) - level) < 4 * sampling
+    of_load = found.shares["area"]["pressure"]
+    logarithms = np.log(pressed.area).var() / np.log(table).var()
+    assert of_load[0] == pytest.approx(logarithms, abs=4 / np.sqrt(found.draws))
+    assert of_load[1] == pytest.approx(0, abs=4 / np.sqrt(found.draws))
+    both = plain_joint(nominal_area="3..5 cm^2")
+    drawn = [
+        each.at_pressure("8..12 MPa").area for each in both.replicas(200, seed=found.seed)
+    ]
+    quantiles = both.uncertainty("8..12 MPa", draws=200, quantities=["area"])
+    np.testing.assert_allclose(
+        quantiles.quantiles["area"][:, 0], np.quantile(drawn, quantiles.levels), rtol=1e-9
+    )
+
+
+def test_a_range_of_forces_is_one_of_pressures():
+    joint = plain_joint()
+    for force, pressure in (
+        ("4..5 kN", "10..12.5 MPa"),
+        ("4 kN +- 10%", "10 MPa +- 10%"),
+        ({"measured": ["4 kN", "5 kN"]}, {"measured": ["10 MPa", "12.5 MPa"]}),
+    ):
+        by_force = joint.uncertainty(joint.pressure_of(force), draws=100)
+        by_pressure = joint.uncertainty(pressure, draws=100)
+        for name, rows in by_force.quantiles.items():
+            np.testing.assert_allclose(rows, by_pressure.quantiles[name], rtol=1e-9)
+
+
+def test_friction_may_be_a_range_that_replicas_draw():
+    joint = plain_joint(friction="0.1..0.3")
+    assert [*joint.inputs] == ["friction"]
+    slips = []
+    for replica in joint.replicas(20):
+        sheared = replica.at_pressure(PRESSURE).contact.tangential()
+        assert sheared.friction == replica.inputs["friction"]
+        one = joint.central.at_pressure(PRESSURE).tangential(sheared.friction)
+        assert sheared.gross_slip == pytest.approx(float(one.gross_slip), rel=1e-12)
+        slips.append(float(sheared.gross_slip))
+    assert max(slips) > 1.5 * min(slips)
+    with pytest.raises(InputError, match=r"friction = '0.3..0.1': .* upside down"):
+        plain_joint(friction="0.3..0.1")
+    with pytest.raises(OutOfRangeError, match="friction must be"):
+        plain_joint(friction="-0.1..0.3")
+
+
+def test_five_numbers_may_be_ranges():
+    numbers = {"hurst": 0.8, "q0": 0.0126, "q1": 0.8, "h_max": 3.0, "unit": "um"}
+    ranged = numbers | {"h_rms": "0.6..0.8 um", "q1": "0.6..0.8 1/um"}
+    ranged |= {"q0": "0.0126 1/um", "h_max": "3 um"}
+    found = uncertainty(ranged, "60 GPa", pressure=PRESSURE, quantities=["area"])
+    rng = np.random.default_rng(3)
+    drawn = numbers | {
+        "h_rms": rng.uniform(0.6, 0.8, 20_000),
+        "q1": rng.uniform(0.6, 0.8, 20_000),
+    }
+    pressed = contact(Surface(**drawn), "60 GPa", pressure=PRESSURE, theory="calibrated")
+    table = pressed.area * np.exp(rng.standard_normal(20_000) * pressed.area_scatter)
+    for level, quantile in zip(found.levels, found.quantiles["area"][:, 0], strict=True):
+        sampling = np.sqrt(level * (1 - level) * (1 / found.draws + 1 / table.size))
+        assert abs(np.mean(table < quantile) - level) < 4 * sampling
+    # a joint takes the same numbers
+    alone = Joint(ranged, bodies="60 GPa", gas="vacuum")
+    of_joint = alone.uncertainty(PRESSURE, quantities=["area"])
+    np.testing.assert_allclose(
+        of_joint.quantiles["area"], found.quantiles["area"], rtol=1e-9
+    )
+
+
+def test_one_modulus_of_two_may_be_a_range():
+    bodies = Bodies(E=("200..220 GPa", "70 GPa"), nu=(0.3, 0.33))
+    face = FACE | {"Ra": "0.4 um", "nominal_area": "4 cm^2"}
+    found = uncertainty(face, bodies, pressure=PRESSURE, draws=100, quantities=["area"])
+    assert [*found.inputs] == ["bodies.E.0"]
+    stiff, soft = (
+        contact(
+            Surface.from_roughness(**face),
+            Bodies(E=(E, "70 GPa"), nu=(0.3, 0.33)),
+            pressure=PRESSURE,
+        )
+        for E in ("220 GPa", "200 GPa")
+    )
+    assert stiff.area < found.quantiles["area"][1, 0] < soft.area
+
+
+SURFACE = [
+    *[
+        "--hurst",
+        "0.8",
+        "--longest",
+        "500um",
+        "--shortest",
+        "8um",
+        "--nominal-area",
+        "4cm^2",
+    ]
+]
+
+
+def test_the_contact_command_takes_ranges_wherever_a_number_is_typed(tmp_path):
+    given = FACE | {"Ra": "0.4 um +- 0.04 um", "nominal_area": "4 cm^2"}
+    bodies = Bodies("58..62 GPa", hardness="0.9..1.1 GPa")
+    found = uncertainty(given, bodies, pressure=["10 MPa", "20..25 MPa"])
+    arguments = [
+        "contact",
+        "--Ra",
+        "0.4 um +- 0.04 um",
+        *SURFACE,
+        "--E-star",
+        "58..62GPa",
+    ]
+    load = ["--hardness", "0.9..1.1 GPa", "-p", "10MPa,20..25MPa"]
+    printed = json.loads(run(*arguments, *load, "--json"))
+    for name, rows in found.quantiles.items():
+        columns = [printed["columns"][f"{name}{end}"] for end in ("_low", "", "_high")]
+        np.testing.assert_allclose(columns, rows, rtol=1e-12)
+    assert printed["shares"]["area"]["pressure"][1] > 0.1
+    text = run(*arguments, *load)
+    assert f"shares in area at 0.01 GPa: {found.shares_text('area', 0)}" in text
+    # of a file
+    path = tmp_path / "surface.toml"
+    path.write_text(
+        """
+        [surface]
+        Ra = "0.4 um +- 0.04 um"
+        hurst = 0.8
+        longest = "500 um"
+        shortest = "8 um"
+        nominal_area = "4 cm^2"
+        [material]
+        E_star = "58..62 GPa"
+        """
+    )
+    of_file = json.loads(run("contact", "--file", path, *load, "--json"))
+    assert of_file["columns"] == printed["columns"]
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["--hardness", "2..1GPa"], "hardness = '2..1GPa': the range is upside down"),
+        (["--conductivity", "5..4 W/(m K)"], "conductivity = '5..4 W/(m K)': the range"),
+        (["--E-star", "60..50GPa"], "E_star = '60..50GPa': the range is upside down"),
+        (["--Ra", "0.5um..0.4um"], "Ra = '0.5um..0.4um': the range is upside down"),
+        (["-p", "9..8MPa"], "pressure = '9..8MPa': the range is upside down"),
+        (["--Ra", "0.4..0.5um", "--leakage"], "--quantity flow_coefficient"),
+        (["--draws", "200"], "--draws and --seed are of numbers that are ranges"),
+    ],
+)
+def test_the_contact_command_refuses_ranges_that_are_none(more, said):
+    options = {"--Ra": "0.4um", "--E-star": "60GPa", "-p": "10MPa"}
+    if more[0] in options:
+        options[more[0]] = more[1]
+        more = more[2:]
+    base = [word for pair in options.items() for word in pair]
+    assert said in refused("contact", *SURFACE, *base, *more)
+
+
+def test_commands_of_known_numbers_name_those_that_take_ranges():
+    base = ["--Ra", "0.4..0.5um", *SURFACE, "--E-star", "60GPa"]
+    for command in (["curve"], ["sensitivity", "-p", "10MPa"]):
+        said = refused(*command, *base)
+        assert "Ra = '0.4..0.5um' is a range" in said
+        assert "mbma contact, joint and batch take ranges" in said

@@ -73,7 +73,7 @@ class Gas:
 class Interface:
     """What is between two bodies besides their roughness."""
 
-    friction: float | None = None  # coefficient of friction
+    friction: ArrayLike | None = None  # coefficient of friction
     direction: str | None = None  # of the shear, "along" or "across" the lay
     gas: Gas | None = None
 

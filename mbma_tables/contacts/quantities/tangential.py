@@ -14,7 +14,7 @@ from mbma_tables.common.arguments import (
     Numbers,
     finite_array,
     is_labelled,
-    number_in,
+    positive_array,
     require,
 )
 from mbma_tables.common.errors import InputError
@@ -33,7 +33,13 @@ ISOTROPIC = 1.4  # anisotropy up to which the isotropic ratio is taken
 def checked_friction(friction: Any) -> None:
     """Reject coefficients of friction that are given and not positive."""
     if friction is not None:
-        number_in("friction", friction, 1e-12, 1e12)
+        numbers = positive_array("friction", friction)
+        require(
+            "friction",
+            numbers,
+            (numbers >= 1e-12) & (numbers <= 1e12),
+            "in [1e-12, 1e12]",
+        )
 
 
 def checked_direction(direction: Any, surface: Any) -> None:
@@ -69,7 +75,7 @@ class Tangential:
     """
 
     ratio: Any  # kappa
-    friction: float | None
+    friction: ArrayLike | None
     pressure: Numbers
     mean_separation: Numbers
     stiffness: Numbers  #: k_t of full stick, d(tau)/d(delta) [stress/length]
@@ -150,7 +156,7 @@ class Tangential:
         require(name, array, array >= 0, "at least 0")
         return array
 
-    def _slipping(self) -> tuple[State, float]:
+    def _slipping(self) -> tuple[State, Any]:
         """The normal contact, and the coefficient of friction; an error where slip is not known."""
         if isinstance(self._normal, str):
             raise InputError(self._normal)
@@ -158,7 +164,9 @@ class Tangential:
             raise InputError(
                 "slip needs friction, the coefficient of friction: tangential(friction=...)"
             )
-        return self._normal, self.friction
+        if is_labelled(self.friction):
+            return self._normal, self.friction
+        return self._normal, np.asarray(self.friction, dtype=float)[()]
 
 
 def tangential_ratio_of(contact: State, direction: str | None = None) -> Any:

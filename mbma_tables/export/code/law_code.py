@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.bodies.bodies import Bodies
+from mbma_tables.common.arguments import one_number
 from mbma_tables.common.errors import InputError
 from mbma_tables.contacts.law.law import ContactLaw
 from mbma_tables.contacts.quantities.gas import VACUUM
@@ -158,7 +159,9 @@ def asked_law(
         # quantities need it as that of the bodies
         hardness = options.get("hardness", math.inf)
         bodies = with_conductivity(E_star, hardness, conductivity, conductivity_unit)
-    checked_friction(friction)
+    if friction is not None:
+        one_number("friction", friction)
+        checked_friction(friction)
     if friction is not None and kappa is None:
         raise InputError(
             "friction needs kappa, the normal over the tangential stiffness before slip"
