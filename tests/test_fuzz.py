@@ -128,7 +128,7 @@ def scene_numbers(path):
     scene = Scene.from_toml(path)
     surface = scene.surface
     return [
-        scene.E_star,
+        scene.in_units.E_star,
         scene.rtol or 1e-3,
         surface.hurst,
         surface.q0,

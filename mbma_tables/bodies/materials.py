@@ -10,7 +10,6 @@ numbers are in tables/metals.csv.
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import difflib
 import functools
@@ -32,7 +31,7 @@ from mbma_tables.common.arguments import (
     require,
 )
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.files import shipped_file
+from mbma_tables.common.files import records, shipped_file
 from mbma_tables.common.units import Units, factor, in_one_unit, read
 
 # plasticity index E* g/p_m up to which elastic areas are within 5% of those with a hardness
@@ -257,8 +256,7 @@ def _metals() -> tuple[dict[str, Metal], dict[tuple[str, ...], str]]:
     """The metals of tables/metals.csv by name, and all their names by the words of these."""
     metals: dict[str, Metal] = {}
     names: dict[tuple[str, ...], str] = {}
-    lines = shipped_file("metals.csv").read_text(encoding="utf-8").splitlines()
-    for row in csv.DictReader(line for line in lines if not line.startswith("#")):
+    for row in records(shipped_file("metals.csv")):
         name = row["name"]
         scale = row["scale"]
         tempers = []

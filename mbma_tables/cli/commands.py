@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
+from mbma_tables.bodies.bodies import Bodies
 from mbma_tables.cli import options
 from mbma_tables.cli.format import Report, column_unit, columns_of, report_answer, to_json
 from mbma_tables.common.arguments import finite_array
@@ -183,16 +184,16 @@ def curve_command(
     """
     options.check_plot(plot, output.out)
     from mbma_tables.common import plots
-    from mbma_tables.contacts.contact import contact
-    from mbma_tables.design.scenes.run import other_theory
+    from mbma_tables.contacts.contact import contact, contact_where_finite
 
     model = model.of(specimen.surface)
     surface = specimen.surface
     bodies = model.bodies(specimen, conductivity)
     theory = model.theory
-    modulus = 1.0 if specimen.E_star is None else specimen.E_star
     gap = float(surface.h_max) * SEARCHED
-    gap = gap[np.isfinite(other_theory(theory, surface, gap, 1.0).pressure)]
+    elastic = Bodies(1.0).in_units(surface)
+    at_all = contact_where_finite(surface, elastic, gap, theory)
+    gap = gap[np.isfinite(at_all.pressure)]
     area = np.asarray(contact(surface, bodies, separation=gap, theory=theory).area)
     rising = slice(np.flatnonzero(area > 0)[0], int(area.argmax()) + 1)
     wanted = np.geomspace(
@@ -209,12 +210,11 @@ def curve_command(
     picture = b""
     if plot is not None:
         title = specimen.title + (f", hardness {model.hardness}" if model.yields else "")
-        cap = answer.bodies.hardness
-        others = [name for name in DRAWN if name != theory.name]
-        curves = [
-            answer.curve(leakage),
-            *(other_theory(name, surface, gap, modulus, cap) for name in others),
-        ]
+        curves = [answer.curve(leakage)]
+        for name in DRAWN:
+            if name != theory.name:
+                other = contact_where_finite(surface, answer.bodies, gap, name)
+                curves.append(other.curve())
         labels = plots.pressure_label(unit_of("pressure", specimen.units))
         of_flow = plots.leakage_label(unit_of("flow_coefficient", specimen.units))
         picture = plots.to_picture(

@@ -1,6 +1,7 @@
 """Files: shipped data, reading with a size limit, writing whole or not at all."""
 
 import contextlib
+import csv
 import glob
 import os
 import pathlib
@@ -52,6 +53,12 @@ def read_once(
     state = stat.st_mtime_ns, stat.st_size
     content: Content = _read_in_state(file.resolve(), state, read)
     return content
+
+
+def records(path: pathlib.Path) -> list[dict[str, str]]:
+    """Rows of a CSV file that ships, by column; lines that begin with # are comments."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return list(csv.DictReader(line for line in lines if not line.startswith("#")))
 
 
 def numbers_of(lines: list[str], delimiter: str | None) -> FloatArray:

@@ -165,6 +165,19 @@ def contact_of(
     return Contact(setup, values, solved.islands, solved.answer, solved.loaded)
 
 
+def contact_where_finite(
+    surface: AnySurface, bodies: BodiesInUnits, separation: FloatArray, theory: Any
+) -> Contact:
+    """The contact of one surface at separations, NaN where the theory's force has no bound, as Persson's at u = 0."""
+    from mbma_tables.theories.users import answer_where_finite
+
+    setup = Setup(surface, bodies, resolve(theory, surface))
+    own = setup.theory_of(bodies)
+    _, u = both_separations("separation", separation, surface.h_max, own.ends_at_h_max)
+    answer = answer_where_finite(own, surface, u)
+    return Contact(setup, {"separation": separation, "mean_separation": u}, answer=answer)
+
+
 def _solved(
     setup: Setup,
     surface: AnySurface,
@@ -215,15 +228,7 @@ def _separations(
     gap = question.value
     is_gap = name in GAPS
     lighter = None
-    if name == "separation":
-        require(
-            name,
-            gap,
-            gap >= -h_max,
-            "at least -h_max, where the model ends at full compression",
-        )
-    elif name != "pressure" or setup.bodies.adhesion is None:
-        require(name, gap, gap >= 0, "at least 0")
+    question.require_in_range(h_max, setup.bodies.adhesion is not None)
     if not is_gap:
         gap, lighter = _inverted(setup, theory, surface, question, modulus, cap)
         name = "mean_separation"

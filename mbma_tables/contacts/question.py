@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.common.arguments import finite_array, is_labelled
+from mbma_tables.common.arguments import finite_array, is_labelled, require
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units
 
@@ -40,6 +40,14 @@ class Question:
     def of_block(self, numbers: Any) -> Question:
         """The same question at other numbers, as those of a block of a DataArray."""
         return Question(self.name, finite_array(self.name, numbers))
+
+    def require_in_range(self, h_max: Any, is_pulled: bool) -> None:
+        """Reject gaps beyond full compression, and pressures and areas below 0, but pulls of bodies that attract."""
+        if self.name == "separation":
+            allowed = "at least -h_max, where the model ends at full compression"
+            require(self.name, self.value, self.value >= -h_max, allowed)
+        elif self.name != "pressure" or not is_pulled:
+            require(self.name, self.value, self.value >= 0, "at least 0")
 
     @property
     def is_gap(self) -> bool:

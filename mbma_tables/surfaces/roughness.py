@@ -7,7 +7,6 @@ Everything else that is assumed follows from Gaussian heights.
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -25,7 +24,7 @@ from mbma_tables.common.arguments import (
     require_name,
 )
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.files import shipped_file
+from mbma_tables.common.files import records, shipped_file
 from mbma_tables.common.shared import shared
 from mbma_tables.common.units import in_one_unit
 from mbma_tables.surfaces import spectrum
@@ -107,9 +106,7 @@ def _one_of(names: tuple[str, ...], numbers: Mapping[str, Any], what: str) -> st
 @shared()
 def processes() -> dict[str, dict[str, str]]:
     """What is known of faces by the process that made them, a row of the shipped file each."""
-    with open(shipped_file("processes.csv"), encoding="utf-8", newline="") as file:
-        lines = (line for line in file if not line.startswith("#"))
-        return {row["process"]: row for row in csv.DictReader(lines)}
+    return {row["process"]: row for row in records(shipped_file("processes.csv"))}
 
 
 def spread_of_processes(provenance: Iterable[Mapping[str, Any]], kind: str) -> float:

@@ -5,7 +5,6 @@ They are in the shipped file tested.csv, by theory, and for contacts with a hard
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -13,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.files import shipped_file
+from mbma_tables.common.files import records, shipped_file
 from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.banded import BandedSurface
@@ -34,11 +33,9 @@ Range = tuple[float, float]
 def _rows() -> dict[tuple[str, str], dict[str, Range]]:
     """Ranges by theory and contact, then by quantity, read once."""
     rows: dict[tuple[str, str], dict[str, Range]] = {}
-    with open(shipped_file("tested.csv"), encoding="utf-8", newline="") as file:
-        lines = (line for line in file if not line.startswith("#"))
-        for row in csv.DictReader(lines):
-            ranges = rows.setdefault((row["theory"], row["contact"]), {})
-            ranges[row["quantity"]] = float(row["least"]), float(row["most"])
+    for row in records(shipped_file("tested.csv")):
+        ranges = rows.setdefault((row["theory"], row["contact"]), {})
+        ranges[row["quantity"]] = float(row["least"]), float(row["most"])
     return rows
 
 

@@ -7,6 +7,7 @@ import pytest
 from helpers import Springs, contact_of, refusals
 
 from mbma_tables import Bodies, InputError, Scene, Surface, contact
+from mbma_tables.bodies.adhesion import Adhesion
 from mbma_tables.bodies.bodies import mean_conductivity
 from mbma_tables.theories import THEORIES, Mbma
 
@@ -289,3 +290,17 @@ def test_bodies_are_those_of_contacts():
     for name in (*quantities, "yielded", "plane_separation"):
         np.testing.assert_allclose(found[name], known.quantity(name), rtol=1e-9)
         assert found[name].attrs["units"] == known.units[name]
+
+
+def test_bodies_that_attract_each_other_may_be_pulled():
+    """A scene refused every negative pressure."""
+    surface = Surface(0.8, 0.1, 2.0, 0.02, 0.07, unit="um")
+    sticky = Bodies("1 GPa", adhesion=Adhesion("10 mJ/m^2", "20 nm"))
+    known = contact(surface, sticky, pressure="0 MPa", theory="calibrated")
+    pulled = [-0.5 * float(known.pull_off)]
+    asked = {"pressure": pulled, "theory": "calibrated"}
+    found = Scene(surface, sticky, **asked, quantities=["area"]).run()
+    truth = contact(surface, sticky, **asked)
+    assert found["area"].values == pytest.approx(truth.area, rel=1e-6)
+    with pytest.raises(InputError, match="pressure must be at least 0"):
+        Scene(surface, "1 GPa", **asked)

@@ -11,7 +11,6 @@ the seconds of that work on the machine that measured. `python -m generate cost`
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import functools
 import math
@@ -21,13 +20,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.files import shipped_file
+from mbma_tables.common.files import records, shipped_file
 from mbma_tables.contacts.question import both_separations
 from mbma_tables.islands.island_models import AnyModel
 from mbma_tables.tables.island4d import Island4dModel
 from mbma_tables.tables.universal import UniversalModel
+from mbma_tables.theories import resolve
 
-TABLES = ("universal", "island4d")  # island models that are tables
 LEAKAGE = "leakage"  # of `Contact.leakage`: several quantities under one name
 ISLAND_SHARE = 0.5  # share of a step's tolerance; the rest is for its quadrature
 AMPLIFICATION = {
@@ -87,21 +86,17 @@ class Costs(NamedTuple):
 
         NaN if none was measured.
         """
-        rows = [
-            row
+        # calls and opening a table have one row, without a tolerance
+        by_rtol = sorted(
+            (row.rtol or 0.0, row.cost)
             for row in self.rows
             if row.island_model == island_model and row.what == what
-        ]
-        if not rows:
-            return math.nan
-        # calls and opening a table have one row, without a tolerance
-        by_rtol = sorted((row.rtol or 0.0, row.cost) for row in rows)
-        _, cost = by_rtol[0]
-        for measured_rtol, cost_there in by_rtol:
-            # decimal tolerances of a file and of a product may differ by roundoff
-            if rtol is None or measured_rtol <= rtol * (1 + 1e-9):
-                cost = cost_there
-        return self.seconds * cost
+        )
+        # decimal tolerances of a file and of a product may differ by roundoff
+        limit = math.inf if rtol is None else rtol * (1 + 1e-9)
+        costs = [cost for measured_rtol, cost in by_rtol if measured_rtol <= limit]
+        tightest = [cost for _, cost in by_rtol[:1]]
+        return self.seconds * (costs or tightest or [math.nan])[-1]
 
 
 class Distance(NamedTuple):
@@ -130,27 +125,23 @@ def _cell(column: str, text: str) -> str | float | None:
     return float(text) if text else None
 
 
-def _records(kind: Any, path: pathlib.Path) -> tuple[Any, ...]:
+def _rows(kind: Any, path: pathlib.Path) -> tuple[Any, ...]:
     """Rows of a CSV file whose columns are the fields of a kind."""
-    with path.open(encoding="utf-8", newline="") as file:
-        content = csv.DictReader(line for line in file if not line.startswith("#"))
-        records = list(content)
-    rows = []
-    for record in records:
-        fields = {column: _cell(column, text) for column, text in record.items()}
-        rows.append(kind(**fields))
-    return tuple(rows)
+    return tuple(
+        kind(**{column: _cell(column, text) for column, text in record.items()})
+        for record in records(path)
+    )
 
 
 @functools.cache
 def shipped_distances() -> tuple[Distance, ...]:
     """The distances that ship with the library."""
-    return _records(Distance, shipped_file("distance.csv"))
+    return _rows(Distance, shipped_file("distance.csv"))
 
 
 def read_costs(path: pathlib.Path) -> Costs:
     """Costs from a CSV file."""
-    rows = _records(Row, path)
+    rows = _rows(Row, path)
     (seconds,) = (row.cost for row in rows if row.island_model == UNIT)
     return Costs(rows, seconds)
 
@@ -168,19 +159,28 @@ class Step:
     name: str
     why: str  # quantities that need it
     what: str  # description of its evaluation
-    island_model: str | AnyModel | None
-    rtol: float | None  # relative tolerance of the totals, the law or the solver
     count: int  # gaps, islands or points evaluated
     error: float  # certified beforehand; NaN if known from the results only
-    seconds: (
-        float  # by the measured costs, without first use; NaN where nothing was measured
-    )
+    # by the measured costs, without first use; NaN where nothing was measured
+    seconds: float
+    island_model: str | AnyModel | None = None
+    rtol: float | None = None  # relative tolerance of the totals, the law or the solver
     theory: str | None = None  # name of the scene's theory, in steps that use it
 
     @property
     def island_model_name(self) -> str | None:
         """The island model's name."""
         return getattr(self.island_model, "name", self.island_model)  # type: ignore[arg-type]
+
+    def text(self) -> str:
+        """The step in three lines."""
+        source = self.island_model_name or self.theory
+        by = "" if source is None else f" by {source}"
+        rtol = "" if self.rtol is None else f", rtol={self.rtol:.1e}"
+        time = f"time={duration(self.seconds)}"
+        numbers = f"(count={self.count}{rtol}, {_bound(self.error)}, {time})"
+        first = f"  -> {self.name}{by}  {numbers}"
+        return f"{first}\n       {self.what}\n       for: {self.why}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -216,19 +216,9 @@ class Plan:
         lines = [
             f"Scene  (rtol={self.rtol:.1e}, {_bound(self.error)}, {times})",
             f"  theory: {self.theory}",
+            *(step.text() for step in self.steps),
+            f"  left out: {', '.join(self.left_out) or 'nothing'}",
         ]
-        for step in self.steps:
-            source = step.island_model_name or step.theory
-            by = "" if source is None else f" by {source}"
-            rtol = "" if step.rtol is None else f", rtol={step.rtol:.1e}"
-            time = f"time={duration(step.seconds)}"
-            numbers = f"(count={step.count}{rtol}, {_bound(step.error)}, {time})"
-            lines += [
-                f"  -> {step.name}{by}  {numbers}",
-                f"       {step.what}",
-                f"       for: {step.why}",
-            ]
-        lines.append(f"  left out: {', '.join(self.left_out) or 'nothing'}")
         if self.switched_off:
             lines.append(f"  switched off: {', '.join(self.switched_off)}")
         return "\n".join(lines) + "\n"
@@ -242,10 +232,9 @@ def duration(seconds: float) -> str:
     """A time in its unit."""
     if math.isnan(seconds):
         return "not measured"
-    if seconds >= 1:
-        return f"{seconds:.3g} s"
-    if seconds >= 1e-3:
-        return f"{seconds / 1e-3:.3g} ms"
+    for unit, length in (("s", 1.0), ("ms", 1e-3)):
+        if seconds >= length:
+            return f"{seconds / length:.3g} {unit}"
     return f"{seconds / 1e-6:.3g} us"
 
 
@@ -253,7 +242,6 @@ def make_plan(scene: Any) -> Plan:
     """The steps that meet the tolerance, or the tightest of `LADDER` that fit the time budget."""
     if scene.rtol is not None:
         return _Planner(scene, scene.rtol).plan()
-    assert scene.seconds is not None
     least = math.nan
     for rtol in LADDER:
         try:
@@ -262,14 +250,14 @@ def make_plan(scene: Any) -> Plan:
             continue  # too tight for the energy
         if plan.error > rtol:
             continue  # too tight for the theory
-        if math.isnan(plan.seconds):
-            unmeasured = next(step for step in plan.steps if math.isnan(step.seconds))
-            source = f"step {unmeasured.name!r}"
-            if unmeasured.theory:
-                source = f"theory {unmeasured.theory!r}"
-            raise InputError(
-                f"the cost of {source} is not known: give rtol instead of seconds"
-            )
+        for step in plan.steps:
+            if math.isnan(step.seconds):
+                source = (
+                    f"theory {step.theory!r}" if step.theory else f"step {step.name!r}"
+                )
+                raise InputError(
+                    f"the cost of {source} is not known: give rtol instead of seconds"
+                )
         if plan.seconds <= scene.seconds:
             return plan
         least = plan.seconds
@@ -287,13 +275,12 @@ def certified_error(island_model: str | AnyModel, rtol: float) -> float:
         island_model = open_islands(island_model)
     if isinstance(island_model, UniversalModel | Island4dModel):
         certificate = island_model.content.attributes
-        return max(
-            float(certificate["largest_error_F"]), float(certificate["largest_error_A"])
-        )
-    if island_model == "exact":
-        # it works to a tenth of the requested tolerance
-        return 0.1 * rtol
-    return 0.0 if island_model == "rigid" else math.nan
+        return max(float(certificate[f"largest_error_{of}"]) for of in "FA")
+    # the solver works to a tenth of the requested tolerance
+    known = {"exact": 0.1 * rtol, "rigid": 0.0}
+    return (
+        known.get(island_model, math.nan) if isinstance(island_model, str) else math.nan
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -343,44 +330,28 @@ class _Planner:
             steps.append(self.summed("island statistics", "points", what, "rigid"))
         if scene.deltas is not None:
             steps.append(self.profiles())
-        steps += [self.compared(name) for name in scene.theories]
-        return steps
+        return steps + [self.compared(name) for name in scene.theories]
 
     def profiles(self) -> Step:
         """Islands solved one by one."""
         islands = int(np.size(self.scene.deltas))
         rtol = ISLAND_SHARE * self.rtol / AMPLIFICATION["profile"]
-        return Step(
-            name="profiles",
-            why="deltas",
-            what="the island problem solved with p(r) and d(r)",
-            island_model="exact",
-            rtol=rtol,
-            count=islands,
-            error=rtol,
-            seconds=islands * self.costs.of("exact", "profile", rtol),
-        )
+        seconds = islands * self.costs.of("exact", "profile", rtol)
+        what = "the island problem solved with p(r) and d(r)"
+        return Step("profiles", "deltas", what, islands, rtol, seconds, "exact", rtol)
 
     def compared(self, name: str) -> Step:
         """Another theory at the same gaps; where its cost was not measured, that of Persson's."""
         seconds = self.costs.of(name, "gap")
         if math.isnan(seconds):
             seconds = self.costs.of("persson", "gap")
-        return Step(
-            name=name,
-            why="theories",
-            what="another theory at the same gaps",
-            island_model=None,
-            rtol=None,
-            count=self.count,
-            error=1e-9,
-            seconds=self.count * seconds,
-        )
+        what = "another theory at the same gaps"
+        return Step(name, "theories", what, self.count, 1e-9, self.count * seconds)
 
     def island_model(self, tolerance: float) -> str | AnyModel:
         """The island model for a step with that tolerance."""
-        if self.scene.island_model is not None:
-            given: str | AnyModel = self.scene.island_model
+        given: str | AnyModel | None = self.scene.island_model
+        if given is not None:
             return given
         if "sphere_deformation" in self.scene.without:
             return "rigid"
@@ -391,42 +362,38 @@ class _Planner:
     def parts(self) -> set[str]:
         """What of a contact takes time or amplifies errors, by what its quantities are made of."""
         scene = self.scene
-        parts = {part for name, part in PART_OF.items() if scene.computes(name)}
-        if scene.is_inverted:
-            parts.add("inverse")
-        if scene.needs_slopes:
-            parts.add("slopes")
-        if scene.yields:
-            parts.add("yield")
-        return parts
+        given = {
+            "inverse": scene.is_inverted,
+            "slopes": scene.needs_slopes,
+            "yield": scene.in_units.yields,
+        } | {part: scene.computes(name) for name, part in PART_OF.items()}
+        return {part for part, is_needed in given.items() if is_needed}
 
     def contact(self) -> Step:
         """One contact at all gaps, by the scene's theory, or by its law if that suffices and costs less."""
         scene = self.scene
-        why = list(scene.of_contact)
-        why += ["hardness"] * scene.yields
-        if scene.is_inverted and scene.question is not None:
-            why.append(f"{scene.question.name} prescribed")
-        factor = math.prod(by for part, by in AMPLIFICATION.items() if part in self.parts)
-        what = f"pressure, area and derived quantities at {self.count} gaps"
-        if scene.sums_islands:
-            if scene.computes("energy") and self.rtol < MIN_ENERGY_RTOL:
-                best = f"{MIN_ENERGY_RTOL:.0e} at best"
-                raise InputError(f"rtol = {self.rtol:g} is too tight for energy: {best}")
-            what = f"sum over islands (Eqs. 48, 49): {what}"
-            step = self.summed("contact", ", ".join(why), what, None, factor)
-            seconds = step.seconds + self.besides()
-            return dataclasses.replace(step, seconds=seconds, theory=scene.theory_name)
-        return self.contact_or_law(", ".join(why), what, factor)
-
-    def besides(self) -> float:
-        """Seconds of what one contact computes besides pressures and areas at given gaps."""
         parts = self.parts
+        why = [*scene.of_contact, *["hardness"] * ("yield" in parts)]
+        if scene.is_inverted:
+            why.append(f"{scene.question.name} prescribed")
+        reasons = ", ".join(why)
+        factor = math.prod(by for part, by in AMPLIFICATION.items() if part in parts)
+        what = f"pressure, area and derived quantities at {self.count} gaps"
+        if not scene.sums_islands:
+            return self.contact_or_law(reasons, what, factor)
+        if "energy" in parts and self.rtol < MIN_ENERGY_RTOL:
+            best = f"{MIN_ENERGY_RTOL:.0e} at best"
+            raise InputError(f"rtol = {self.rtol:g} is too tight for energy: {best}")
+        what = f"sum over islands (Eqs. 48, 49): {what}"
+        step = self.summed("contact", reasons, what, None, factor)
+        seconds = step.seconds + self.besides(parts)
+        return dataclasses.replace(step, seconds=seconds, theory=scene.theory_name)
+
+    def besides(self, parts: set[str]) -> float:
+        """Seconds of what one contact computes besides pressures and areas at given gaps."""
         # with a hardness the gap at a pressure is found otherwise
         if {"inverse", "yield"} <= parts:
             parts = parts - {"inverse", "yield"} | {"yield inverse"}
-        if not self.scene.sums_islands:
-            parts.discard("slopes")  # other theories have them at once
         theory = self.scene.theory_name
         return sum(
             self.costs.of(theory, f"{part} once")
@@ -439,48 +406,30 @@ class _Planner:
         scene = self.scene
         theory = scene.theory_name
         error = self.theory_error()
-        if scene.yields:
-            error = factor * error
-        at_gaps = self.costs.of(theory, "call")
-        at_gaps += self.count * self.costs.of(theory, "gap")
-        seconds = at_gaps + self.besides()
-        step = Step(
-            name="contact",
-            why=why,
-            what=what,
-            island_model=None,
-            rtol=None,
-            count=self.count,
-            error=error,
-            seconds=seconds,
-            theory=theory,
-        )
+        yields = scene.in_units.yields
+        seconds = self.costs.of(theory, "call")
+        seconds += self.count * self.costs.of(theory, "gap")
+        # such theories have slopes at once
+        seconds += self.besides(self.parts - {"slopes"})
+        own = factor * error if yields else error
+        step = Step("contact", why, what, self.count, own, seconds, theory=theory)
         # a law has force and area only
-        if scene.yields or not {*scene.of_contact} <= {"pressure", "area"}:
+        if yields or not {*scene.of_contact} <= {"pressure", "area"}:
             return step
-        rtol = max(
-            (1 - ISLAND_SHARE) * self.rtol / AMPLIFICATION["inverse"], MIN_LAW_RTOL
-        )
+        rtol = (1 - ISLAND_SHARE) * self.rtol / AMPLIFICATION["inverse"]
+        rtol = max(rtol, MIN_LAW_RTOL)
         lookup = self.costs.of("law", "lookup")
         if scene.is_inverted:
             lookup += self.costs.of("law", "invert")
         by_law = self.costs.of(theory, "law", rtol) + self.count * lookup
-        law_pays = by_law < seconds
-        if math.isnan(seconds):
-            law_pays = self.count >= MIN_LAW_GAPS
-        if not law_pays:
+        is_measured = not math.isnan(seconds)
+        if not (by_law < seconds if is_measured else self.count >= MIN_LAW_GAPS):
             return step
-        return dataclasses.replace(
-            step, name="law", rtol=rtol, error=factor * (rtol + error), seconds=by_law
-        )
+        own = factor * (rtol + error)
+        return dataclasses.replace(step, name="law", rtol=rtol, error=own, seconds=by_law)
 
     def summed(
-        self,
-        name: str,
-        why: str,
-        what: str,
-        priced_as: str | None,
-        factor: float = 1.0,
+        self, name: str, why: str, what: str, priced_as: str | None, factor: float = 1.0
     ) -> Step:
         """A sum over islands at every gap.
 
@@ -489,19 +438,19 @@ class _Planner:
         tolerance = self.rtol / factor
         island_model = self.island_model(tolerance)
         rtol = (1 - ISLAND_SHARE) * tolerance
-        priced = priced_as or _name(island_model)
-        by_gap = self.costs.of(priced, "call") + self.count * self.costs.of(
-            priced, "gap", rtol
-        )
+        # a table of a user's own costs what the shipped one of its kind does
+        is_named = isinstance(island_model, str | UniversalModel | Island4dModel)
+        own = getattr(island_model, "name", island_model) if is_named else ""
+        priced = priced_as or str(own)
+        by_gap = self.costs.of(priced, "call")
+        by_gap += self.count * self.costs.of(priced, "gap", rtol)
         # its islands are answered once, as for a law
         seconds = min(by_gap, self.costs.of(priced, "law", rtol))
         error = factor * (rtol + certified_error(island_model, rtol))
-        return Step(name, why, what, island_model, rtol, self.count, error, seconds)
+        return Step(name, why, what, self.count, error, seconds, island_model, rtol)
 
     def theory_error(self) -> float:
         """Bound of the scene's theory on its numerical error."""
-        from mbma_tables.theories import resolve
-
         surface = self.scene.surface
         question = self.scene.question
         h_max = float(surface.h_max)
@@ -513,14 +462,3 @@ class _Planner:
         within = min(max(farthest, 0.5 * h_max), LAST * h_max)
         theory = resolve(self.scene.theory, surface)
         return float(theory.answer(surface, np.asarray(within)).error)
-
-
-def _name(island_model: Any) -> str:
-    """The name of an island model in the table of measured costs.
-
-    A table of a user's own costs what the shipped one of its kind does: the lookup does not
-    depend on the number of nodes.
-    """
-    if isinstance(island_model, UniversalModel | Island4dModel):
-        return island_model.name
-    return island_model if isinstance(island_model, str) else ""

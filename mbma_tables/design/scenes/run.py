@@ -9,34 +9,30 @@ import dataclasses
 import json
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.bodies.adhesion import AdhesionInUnits
-from mbma_tables.bodies.materials import ELASTIC_PSI
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.display import Variable, dataset_of
 from mbma_tables.common.errors import ConvergenceError
-from mbma_tables.common.plots import Curve, theory_label
 from mbma_tables.common.progress import doing
 from mbma_tables.contacts.quantities.declaration import of_yielding_contacts
 from mbma_tables.contacts.quantities.registry import registry, unit_of
-from mbma_tables.design.scenes.plan import AMPLIFICATION, LEAKAGE, TABLES, Plan, Step
-from mbma_tables.islands.island_models import RigidModel, answer_islands
+from mbma_tables.contacts.question import both_separations
+from mbma_tables.design.scenes.plan import AMPLIFICATION, LEAKAGE, Plan, Step
+from mbma_tables.islands.island_models import RigidModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.self_affine import PARAMETERS
-from mbma_tables.surfaces.surface import Surface
+from mbma_tables.tables.open import open_islands
+from mbma_tables.tables.schema import KINDS
 from mbma_tables.theories import resolve
-from mbma_tables.theories.adhesion import with_adhesion
-from mbma_tables.theories.hardness import with_hardness
-from mbma_tables.theories.mbma.models import get_model
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from mbma_tables.contacts.result import Contact
-    from mbma_tables.theories.mbma.profile import Shape
 
 
 # names of prescribed quantities in results, beside what is computed
@@ -57,16 +53,12 @@ OF_SCENES = {
         "separation",
         "d(r), deformed sphere to mid-plane of the summits (Eq. 34)",
     ),
-    "hertz_area": ("area", "Hertz area of the summits over A0 (eta = 1)"),
 }
 # the gaps, the prescribed quantity, and what islands are ordered by
-COORDINATES = (
-    "separation",
-    "mean_separation",
+COORDINATES = {
+    *("separation", "mean_separation", "profile_delta", "island_delta"),
     *GIVEN.values(),
-    "profile_delta",
-    "island_delta",
-)
+}
 
 
 @dataclasses.dataclass
@@ -76,36 +68,33 @@ class Run:
     scene: Any  # a `Scene`, whose module imports this one
     surface: AnySurface
     gap: Any = None  # separations d
-    # dimensions, values, unit and meaning by name
-    quantities: dict[str, tuple[tuple[str, ...], ArrayLike, str, str]] = (
-        dataclasses.field(default_factory=dict)
-    )
-    errors: dict[str, float] = dataclasses.field(
-        default_factory=dict
-    )  # bounds that steps reached
+    variables: dict[str, Variable] = dataclasses.field(default_factory=dict)
+    # bounds that steps reached
+    errors: dict[str, float] = dataclasses.field(default_factory=dict)
     reasons: dict[str, list[int]] | None = None
 
     def keep(
-        self,
-        name: str,
-        values: ArrayLike,
-        *dims: str,
-        unit: str | None = None,
-        meaning: str | None = None,
-        same: str = "",
+        self, name: str, values: ArrayLike, *dims: str, like: str = "", meaning: str = ""
     ) -> None:
         """Record values over dimensions, gaps by default.
 
-        Unit and meaning are those of the declaration, or of `OF_SCENES`; `same` is a name
-        whose unit and meaning they are.
+        Unit and meaning are those of the declaration, or of `OF_SCENES`; `like` is another
+        quantity with the unit.
         """
-        of_scene = OF_SCENES.get(same or name)
-        like = of_scene[0] if of_scene else same or name
-        if unit is None:
-            unit = unit_of(like, self.scene.in_units.units)
-        if meaning is None:
-            meaning = of_scene[1] if of_scene else registry()[like].meaning
-        self.quantities[name] = (dims or ("gap",), values, unit, meaning)
+        alike, of_scene = OF_SCENES.get(name, (like or name, ""))
+        unit = unit_of(alike, self.scene.in_units.units)
+        meaning = meaning or of_scene or registry()[alike].meaning
+        self.variables[name] = Variable(values, unit, meaning, dims or ("gap",))
+
+    def summing(self, step: Step) -> Any:
+        """The theory that sums islands, with what the plan chose for a step."""
+        # islands that a table does not cover are solved
+        options = self.scene.options | {
+            "island_model": step.island_model,
+            "rtol": step.rtol,
+            "outside": "exact" if step.island_model_name in KINDS else "raise",
+        }
+        return resolve(self.scene.theory, options=options)
 
 
 def _contact(run: Run, step: Step) -> None:
@@ -113,16 +102,7 @@ def _contact(run: Run, step: Step) -> None:
     from mbma_tables.contacts.contact import contact_of
 
     scene = run.scene
-    theory = scene.theory
-    if scene.sums_islands:
-        options = {
-            "island_model": step.island_model,
-            "variant": scene.variant,
-            "rtol": step.rtol,
-            "outside": _outside(step),
-        }
-        theory = resolve(theory, options=options)
-    assert scene.question is not None
+    theory = run.summing(step) if scene.sums_islands else scene.theory
     given = {scene.question.name: scene.question.value}
     # without its end the surface is a higher one, whose mean gaps are others than the scene's
     if "finite_height" in scene.without:
@@ -132,14 +112,14 @@ def _contact(run: Run, step: Step) -> None:
         run.gap = pressed.separation
     _keep_quantities(run, pressed)
     error = float(pressed.error.max())
-    if scene.sums_islands and not scene.yields:
+    if scene.sums_islands and not scene.in_units.yields:
         error *= _amplification(run, theory)
     run.errors[step.name] = error
 
 
 def _keep_quantities(run: Run, pressed: Contact) -> None:
     """Record the requested quantities of a contact."""
-    names = [name for name in run.scene.of_contact if name in registry()]
+    names = [name for name in run.scene.of_contact if name != LEAKAGE]
     if "valid" in names:
         # with the model uncertainty of every quantity that such contacts show
         uncertainties = {declared.uncertainty for declared in registry().values()}
@@ -149,10 +129,11 @@ def _keep_quantities(run: Run, pressed: Contact) -> None:
             if name in uncertainties and declared.is_shown(pressed)
         ]
         # places of the entries that each reason concerns
-        run.reasons = {}
-        for reason, is_concerned in pressed.reasons.items():
-            run.reasons[reason] = np.flatnonzero(is_concerned).tolist()
-    if run.scene.yields:
+        run.reasons = {
+            reason: np.flatnonzero(is_concerned).tolist()
+            for reason, is_concerned in pressed.reasons.items()
+        }
+    if pressed.yields:
         # how near the pressure of the spots is to the hardness, and what elastic contacts lack
         names.append("mean_pressure")
         names += [
@@ -164,19 +145,17 @@ def _keep_quantities(run: Run, pressed: Contact) -> None:
     shape = np.shape(pressed.mean_separation)
     for name in names:
         values = np.broadcast_to(pressed.quantity(name), shape)
-        run.keep(name, values, unit=registry()[name].unit(pressed))
+        declared = registry()[name]
+        run.variables[name] = Variable(
+            values, declared.unit(pressed), declared.meaning, ("gap",)
+        )
     if LEAKAGE in run.scene.quantities:
         for key, variable in pressed.leakage.to_dataset().data_vars.items():
             field = LEAKAGE if key == "K" else f"{LEAKAGE}_{key}"
             facts = variable.attrs
-            run.keep(
-                field, variable.values, unit=facts["units"], meaning=facts["long_name"]
+            run.variables[field] = Variable(
+                variable.values, facts["units"], facts["long_name"], ("gap",)
             )
-
-
-def _outside(step: Step) -> str:
-    """What `outside` is for islands of a step: those that a table does not cover are solved."""
-    return "exact" if step.island_model_name in TABLES else "raise"
 
 
 def _amplification(run: Run, theory: Any) -> float:
@@ -184,20 +163,17 @@ def _amplification(run: Run, theory: Any) -> float:
     scene = run.scene
     h_max = float(run.surface.h_max)
     gap = run.gap[run.gap < h_max]
-    is_inverted = scene.is_inverted
-    needs_slopes = scene.needs_slopes
-    if not gap.size or not (needs_slopes or is_inverted):
+    if not gap.size or not (scene.needs_slopes or scene.is_inverted):
         return 1.0
     totals = theory.totals(run.surface, gap, slopes=True)
     # -d ln p/dd
     log_slope = -totals.pressure_slope / totals.pressure
     factor = 1.0
-    if is_inverted:
+    if scene.is_inverted and scene.area is not None:
         # pressures at prescribed areas: less accurate where the area hardly rises
         by_area = log_slope * totals.area / np.abs(totals.area_slope)
-        at_areas = scene.area is not None
-        factor += max(1.0, float(by_area.max())) if at_areas else 1.0
-    if not needs_slopes:
+        factor += max(1.0, float(by_area.max()))
+    if not scene.needs_slopes:
         return factor
     # the stiffness is small only next to a turning point
     flatness = 1 / ((h_max - gap) * np.abs(log_slope))
@@ -209,103 +185,70 @@ def _law(run: Run, step: Step) -> None:
     from mbma_tables.contacts.law.make import contact_law
 
     scene = run.scene
-    assert step.rtol is not None
-    assert scene.question is not None
-    law = contact_law(run.surface, scene.bodies, theory=scene.theory, rtol=step.rtol)
-    amplification = 1.0
+    rtol = {} if step.rtol is None else {"rtol": step.rtol}
+    law = contact_law(run.surface, scene.bodies, theory=scene.theory, **rtol)
     if scene.is_inverted:
         run.gap = law.separations_of(scene.question)
-        amplification = AMPLIFICATION["inverse"]
     for name in scene.of_contact:
         run.keep(name, getattr(law, name)(separation=run.gap))
-    run.errors[step.name] = amplification * law.error
-
-
-def _shape(surface: AnySurface) -> Shape:
-    """The surface as profiles take it."""
-    if not isinstance(surface, Surface):
-        return cast("Shape", surface)
-    return (
-        float(surface.hurst),
-        float(surface.zeta_1),
-        float(surface.h_max / surface.h_rms),
-    )
+    factor = AMPLIFICATION["inverse"] if scene.is_inverted else 1.0
+    run.errors[step.name] = factor * law.error
 
 
 def hertz_area(run: Run, step: Step) -> None:
     """A/A0 with eta = 1 in Eq. 38 (C.1)."""
-    from mbma_tables.theories.mbma.profile import profile
+    from mbma_tables.theories.mbma.profile import profile, shape_of
 
-    assert step.island_model is not None
-    assert step.rtol is not None
     surface = run.surface
-    variant = run.scene.variant
-    island_model = get_model(step.island_model, step.rtol, variant)
+    model, variant, rtol, outside = run.summing(step).sums
+    along_depth = profile(shape_of(surface), model, variant, rtol, outside, rows=4)
     depth = (float(surface.h_max) - run.gap) / float(surface.h_rms)
-    along_depth = profile(
-        _shape(surface),
-        island_model,
-        variant,
-        step.rtol,
-        _outside(step),
-        rows=4,
-    )
-    is_touching = depth > 0
     area = np.zeros(depth.shape)
-    area[is_touching] = along_depth.totals(depth[is_touching])[3]
-    run.keep("area", area, meaning=OF_SCENES["hertz_area"][1])
+    area[depth > 0] = along_depth.totals(depth[depth > 0])[3]
+    run.keep("area", area, meaning="Hertz area of the summits over A0 (eta = 1)")
     run.errors[step.name] = along_depth.error
 
 
 def island_statistics(run: Run, step: Step) -> None:
     """Number of islands at every gap; load, area, density along their approach (Eqs. 40, 42)."""
-    from mbma_tables.theories.mbma.island import islands_of, scale_area, scale_force
-    from mbma_tables.theories.mbma.profile import profile, source_of
+    from mbma_tables.theories.mbma.island import islands_of, loads_of
+    from mbma_tables.theories.mbma.profile import profile, shape_of, source_of
 
-    assert step.island_model is not None
-    assert step.rtol is not None
-    scene = run.scene
-    assert scene.points is not None
     surface = run.surface
-    shape = _shape(surface)
-    variant = scene.variant
+    shape = shape_of(surface)
+    model, variant, rtol, outside = run.summing(step).sums
     h_rms = float(surface.h_rms)
     depth = np.asarray(surface.h_max - run.gap) / h_rms
     source = source_of(shape, variant)
     deepest = max(float(depth.max()), 0.0)
     # approaches up to the deepest, graded towards first contact
-    fraction = np.linspace(0, 1, scene.points + 1)[1:]
+    fraction = np.linspace(0, 1, run.scene.points + 1)[1:]
     stretched = fraction * np.arcsinh(np.sqrt(deepest / source.layer))
     delta = source.layer * np.sinh(stretched) ** 2
     # where no gap touches there is no distribution
     number = np.zeros(depth.size)
     density = np.zeros((depth.size, delta.size))
-    pressure = np.zeros(delta.size)
-    area = np.zeros(delta.size)
-    error = 0.0
+    force, area, error = np.zeros((3, delta.size))
     if deepest > 0:
         # islands are counted without an island model
-        counted = profile(shape, RigidModel(), variant, step.rtol, rows=3)
-        number[depth > 0] = counted.totals(depth[depth > 0])[2]
+        counted = profile(shape, RigidModel(), variant, rtol, rows=3)
         groups, s, q0 = islands_of(surface, delta * h_rms, variant)
-        island_model = get_model(step.island_model, step.rtol, variant)
-        phi = answer_islands(island_model, groups, _outside(step))
-        pressure = scene.E_star * s / q0 * scale_force(groups) * phi.phi_F
+        number[depth > 0] = counted.totals(depth[depth > 0])[2] * q0**2
+        force, area, error = loads_of(model, groups, s, q0, outside)
+        error = np.maximum(error, counted.error)
         # without the area of smaller scales, all of the summit's area is in contact: eta = 1
-        eta = groups["eta"] if "subscale_area" in scene.without else 1.0
-        area = scale_area(groups) * phi.phi_A / eta / q0**2
+        if "subscale_area" in run.scene.without:
+            area = area / groups["eta"]
         shift, rate = source.heights(groups, delta)
         spread = source.density(groups, delta, shift - rate * depth[:, None])
-        number = number * q0**2
         # no island approaches further than the highest one
         density = np.where(delta <= depth[:, None], spread, 0.0) * q0**2 / s
-        error = max(counted.error, float(np.max(phi.error)))
     run.keep("island_number", number)
     run.keep("island_delta", delta * h_rms, "approach")
-    run.keep("island_force", pressure, "approach")
+    run.keep("island_force", float(run.scene.in_units.E_star) * force, "approach")
     run.keep("island_area", area, "approach")
     run.keep("island_density", density, "gap", "approach")
-    run.errors[step.name] = error
+    run.errors[step.name] = float(np.max(error))
 
 
 def profiles(run: Run, step: Step) -> None:
@@ -313,63 +256,31 @@ def profiles(run: Run, step: Step) -> None:
     from mbma_tables.islands import greenwood_tripp
     from mbma_tables.theories.mbma.island import islands_of
 
-    assert step.rtol is not None
-    scene = run.scene
-    delta = np.ravel(scene.deltas)
-    groups, s, q0 = islands_of(run.surface, delta, scene.variant)
+    delta = np.ravel(run.scene.deltas)
+    theory = run.summing(step)
+    groups, s, q0 = islands_of(run.surface, delta, theory.variant)
     sigma = groups["sigma"]
-    solved = greenwood_tripp.solve(groups["X"], groups["mu"], rtol=step.rtol)
+    solved = greenwood_tripp.solve(groups["X"], groups["mu"], rtol=theory.rtol)
     radius = np.sqrt(2 * groups["R_d"] * sigma)
-    run.keep("profile_delta", delta, "island")
-    pressure = scene.E_star * q0 * s * (sigma / radius)[:, None] * solved.pressure
+    stress = float(run.scene.in_units.E_star) * q0 * s * sigma / radius
     nodes = ("island", "node")
+    run.keep("profile_delta", delta, "island")
     run.keep("profile_radius", solved.rho * radius[:, None] / q0, *nodes)
-    run.keep("profile_pressure", pressure, *nodes)
+    run.keep("profile_pressure", stress[:, None] * solved.pressure, *nodes)
     run.keep("profile_gap", solved.gap * sigma[:, None] * s, *nodes)
     run.errors[step.name] = float(np.max(solved.error))
 
 
-def other_theory(
-    theory: Any,
-    surface: AnySurface,
-    gap: FloatArray,
-    E_star: float,
-    hardness: float = math.inf,
-    adhesion: AdhesionInUnits | None = None,
-) -> Curve:
-    """A theory, given as for `contact`, at gaps; NaN where its force has no bound, as Persson's at u = 0."""
-    from mbma_tables.theories.users import answer_where_finite
-
-    chosen = resolve(theory, surface)
-    u = (float(surface.h_max) + gap) / 2
-    if hardness < math.inf:
-        chosen = with_hardness(chosen, hardness, E_star)
-    elif adhesion is not None:
-        chosen = with_adhesion(chosen, adhesion, E_star)
-    answer = answer_where_finite(chosen, surface, u)
-    of_pressure, of_area = answer._fields[:2]
-    return Curve(
-        theory_label(chosen.name),
-        u / surface.h_rms,
-        E_star * answer.pressure,
-        answer.area,
-        chosen.scatter(surface, of_pressure, answer.area),
-        chosen.scatter(surface, of_area, answer.area),
-    )
-
-
 def comparison(run: Run, step: Step) -> None:
     """Another theory beside the scene's own."""
+    from mbma_tables.contacts.contact import contact_where_finite
+
     scene = run.scene
-    cap = float(scene.in_units.hardness)
-    other = other_theory(
-        *(step.name, scene.surface, run.gap, scene.E_star, cap),
-        adhesion=scene.in_units.adhesion,
-    )
-    for name, values in (("pressure", other.pressure), ("area", other.area)):
-        letter = "F" if name == "pressure" else "A"
+    other = contact_where_finite(scene.surface, scene.in_units, run.gap, step.name)
+    for name, letter in (("pressure", "F"), ("area", "A")):
         meaning = f"{letter}/A0 by {step.name}"
-        run.keep(f"{step.name}_{name}", values, meaning=meaning, same=name)
+        values = other.quantity(name)
+        run.keep(f"{step.name}_{name}", values, like=name, meaning=meaning)
 
 
 def run_plan(scene: Any, plan: Plan) -> xr.Dataset:
@@ -384,13 +295,12 @@ def run_plan(scene: Any, plan: Plan) -> xr.Dataset:
     h_max = float(scene.surface.h_max)
     question = scene.question
     if question is not None and question.is_gap:
-        is_separation = question.name == "separation"
-        run.gap = question.value if is_separation else 2 * question.value - h_max
+        run.gap, _ = both_separations(question.name, question.value, h_max, False)
         if "finite_height" in scene.without:
             run.surface = _without_end(scene.surface, run.gap, plan.rtol)
     elif question is not None:
         run.keep(GIVEN[question.name], question.value)
-    # steps of a plan by name; any other name is that of a theory to compare with
+    # steps by name; any other name is that of a theory to compare with
     evaluated_by: dict[str, Callable[[Run, Step], None]] = {
         "contact": _contact,
         "law": _law,
@@ -400,8 +310,7 @@ def run_plan(scene: Any, plan: Plan) -> xr.Dataset:
     }
     for step in plan.steps:
         doing(f"{step.name}: {step.count}")
-        evaluate = evaluated_by.get(step.name, comparison)
-        evaluate(run, step)
+        evaluated_by.get(step.name, comparison)(run, step)
     error = max(run.errors.values(), default=0.0)
     if error > plan.rtol:
         reached = f"the error bound reached is {error:.2e}, above rtol = {plan.rtol:.2e}"
@@ -409,7 +318,9 @@ def run_plan(scene: Any, plan: Plan) -> xr.Dataset:
     if run.gap is not None:
         run.keep("separation", run.gap)
         run.keep("mean_separation", (h_max + run.gap) / 2)
-    return to_dataset(run, plan)
+    found = dataset_of(run.variables, {})
+    found.attrs = _attributes(run, plan)
+    return found.set_coords(sorted(COORDINATES & run.variables.keys()))
 
 
 def _without_end(surface: Any, gap: FloatArray, rtol: float) -> AnySurface:
@@ -423,65 +334,54 @@ def _without_end(surface: Any, gap: FloatArray, rtol: float) -> AnySurface:
     return higher
 
 
-def to_dataset(run: Run, plan: Plan) -> xr.Dataset:
-    """The computed quantities; coordinates are gaps and the prescribed quantity."""
-    import xarray as xr
-
-    variables = {}
-    for name, (dims, values, unit, meaning) in run.quantities.items():
-        variables[name] = xr.Variable(dims, values, {"units": unit, "long_name": meaning})
-    dataset = xr.Dataset(variables, attrs=_attributes(run, plan))
-    return dataset.set_coords([name for name in COORDINATES if name in variables])
-
-
-def _attributes(run: Run, plan: Plan) -> dict[str, str | float]:
+def _attributes(run: Run, plan: Plan) -> dict[str, Any]:
     """What the quantities were calculated from and how."""
     scene = run.scene
-    surface = scene.surface
-    by_islands = [step for step in plan.steps if step.island_model is not None]
-    island_models = {step.name: step.island_model_name for step in by_islands}
-    attributes: dict[str, str | float] = {
+    models = {
+        step.name: step.island_model
+        for step in plan.steps
+        if step.island_model is not None
+    }
+    names = {step: getattr(model, "name", model) for step, model in models.items()}
+    variant = ""
+    if scene.sums_islands:
+        variant = resolve(scene.theory, options=scene.options).variant_name
+    attributes: dict[str, Any] = {
         "title": scene.title,
         "plan": plan.text(),
         "rtol": plan.rtol,
         "error": max(run.errors.values(), default=0.0),
         "errors": json.dumps(run.errors),
         "theory": scene.theory_name,
-        "variant": scene.variant.name if scene.sums_islands else "",
-        "island_models": json.dumps(island_models),
+        "variant": variant,
+        "island_models": json.dumps(names),
         "switched_off": " ".join(sorted(scene.without)),
-        "E_star": float(scene.E_star),
-        "table_hashes": json.dumps(_hashes(by_islands)),
+        "E_star": float(scene.in_units.E_star),
+        "table_hashes": json.dumps(_hashes(list(models.values()))),
     }
-    # psi times the hardness
-    stress = float(scene.E_star * surface.rms_gradient)
-    if not scene.yields:
-        attributes["elastic_hardness"] = stress / ELASTIC_PSI
-    else:
+    if scene.in_units.yields:
         attributes["hardness"] = float(scene.in_units.hardness)
-        attributes["psi"] = stress / float(scene.in_units.hardness)
+        attributes["psi"] = float(scene.state.psi)
+    else:
+        attributes["elastic_hardness"] = float(scene.state.elastic_hardness)
     if run.reasons is not None:
         attributes["reasons"] = json.dumps(run.reasons)
     for name in PARAMETERS:
-        number = getattr(surface, name)
+        number = getattr(scene.surface, name)
         # a spectrum that is no power law has no Hurst exponent
         if number is not None:
             attributes[f"surface_{name}"] = float(number)
     return attributes
 
 
-def _hashes(steps: list[Step]) -> dict[str, str]:
-    """Hashes of the values of the tables used."""
-    used = {step.island_model_name: step.island_model for step in steps}
-    if not used.keys() & set(TABLES):
-        return {}
-    from mbma_tables.tables.open import open_islands
-
+def _hashes(models: list[Any]) -> dict[str, str]:
+    """Hashes of the values of the tables used, which are named or objects that a user opened."""
     hashes = {}
-    for name in TABLES:
-        if name in used:
-            # a table is named, or is an object that a user opened
-            island_model: Any = used[name]
-            table = open_islands(name) if island_model == name else island_model
-            hashes[name] = str(table.content.attributes["values_sha256"])
+    for model in models:
+        table = (
+            open_islands(model) if isinstance(model, str) and model in KINDS else model
+        )
+        content = getattr(table, "content", None)
+        if content is not None:
+            hashes[table.name] = str(content.attributes["values_sha256"])
     return hashes

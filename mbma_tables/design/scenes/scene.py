@@ -17,7 +17,6 @@ from mbma_tables.bodies.bodies import Bodies, BodiesInUnits
 from mbma_tables.common.arguments import (
     number_in,
     positive_array,
-    require,
     require_name,
     whole_number_in,
 )
@@ -30,7 +29,6 @@ from mbma_tables.contacts.result import Contact, Setup
 from mbma_tables.design.scenes.plan import LEAKAGE, Plan, make_plan
 from mbma_tables.design.specimen import from_tables, refuse_joint, schema
 from mbma_tables.islands.island_models import beside
-from mbma_tables.islands.variants import Variant, get_variant
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.tables.island4d import Island4dModel
 from mbma_tables.tables.universal import UniversalModel
@@ -47,6 +45,9 @@ BY_ARGUMENTS = {
     "theories": "comparison",
 }
 OF_SUMS = "island_model"  # option of theories that sum islands
+OF_ISLANDS = ("deltas", "points", "without")  # arguments of such theories
+# island models whose cost was measured; None is one that the plan chooses
+MEASURED_MODELS = (str, UniversalModel, Island4dModel, type(None))
 OF_FILES = (OF_SUMS, "variant")  # options of a theory that are entries of a file
 # part of the model, and on unless switched off
 REFINEMENTS = ("subscale_area", "sphere_deformation", "finite_height")
@@ -57,12 +58,9 @@ DEFAULT_RTOL = 1e-6  # of MBMA
 DEFAULT_RTOL_OF_OTHERS = 1e-4  # of theories without a certified table
 
 
-def is_made_of(name: str, part: str) -> bool:
-    """Whether a quantity is another one, or made of it by its declaration."""
-    if name == LEAKAGE:
-        name = "flow_coefficient"
-    parts = registry()[name].made_of
-    return name == part or any(is_made_of(each, part) for each in parts)
+def names_of_parts(name: str) -> set[str]:
+    """Names of a quantity and of all that it is made of by its declaration."""
+    return {name}.union(*map(names_of_parts, registry()[name].made_of))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -175,60 +173,54 @@ class Scene:
     def _take_names(self) -> None:
         """Take what is requested, without deltas or other theories pressure and area."""
         if self.quantities is None:
-            is_alone = self.deltas is not None and not self.candidates
+            is_alone = self.deltas is not None and not self._given(*PRESCRIBED)
             vars(self).update(quantities=() if is_alone else ("pressure", "area"))
-        for name, choices in (
-            ("quantities", {**registry(), LEAKAGE: None}),
-            ("without", REFINEMENTS),
-            ("theories", THEORIES),
+        for name, kind, choices in (
+            ("quantities", "quantity", {**registry(), LEAKAGE: None}),
+            ("without", "refinement", REFINEMENTS),
+            ("theories", "theory", THEORIES),
         ):
             names = getattr(self, name)
             if isinstance(names, str) or not isinstance(names, Iterable):
                 raise InputError(f"{name} must be a list of names: write [{names!r}]")
-            kind = {"quantities": "quantity", "without": "refinement"}
             for each in names:
-                require_name(kind.get(name, "theory"), each, choices)
+                require_name(kind, each, choices)
             vars(self)[name] = tuple(dict.fromkeys(names))
         if self.points is not None:
             whole_number_in("points", self.points, 2, 10_000)
-        if not (self.quantities or self.requested_by_arguments):
+        if not (self.quantities or self._given(*BY_ARGUMENTS)):
             raise InputError(
                 "nothing is requested: give quantities, deltas, points or theories"
             )
 
-    @property
-    def candidates(self) -> dict[str, Any]:
-        """What is given of the four quantities of which one is prescribed."""
-        given = {name: getattr(self, name) for name in PRESCRIBED}
-        return {name: value for name, value in given.items() if value is not None}
+    def _given(self, *arguments: str) -> list[str]:
+        """Arguments that are given: neither None nor an empty list."""
+        return [
+            name
+            for name in arguments
+            if getattr(self, name) is not None and np.size(getattr(self, name))
+        ]
 
     def _checked_question(self) -> Question | None:
         """The prescribed quantity with its numbers, a row; None if nothing needs it."""
-        given = self.candidates
         # profiles are those of islands at approaches
-        needs_none = not self.quantities and self.points is None and not self.theories
-        if needs_none and not given:
+        if not (self.quantities or self._given("points", "theories")):
+            for name in self._given(*PRESCRIBED):
+                raise InputError(
+                    f"{name} is not needed for profiles: leave it out, or give quantities"
+                )
             return None
-        if needs_none:
-            raise InputError(
-                f"{next(iter(given))} is not needed for profiles: leave it out, or give "
-                "quantities"
-            )
         question = Question.of(
             self.in_units.units, {name: getattr(self, name) for name in PRESCRIBED}
         )
-        name, numbers = question.name, question.value
-        if np.ndim(numbers) > 1:
+        if np.ndim(question.value) > 1:
             raise InputError(
-                f"{name} must be one number or a list, got shape {numbers.shape}"
+                f"{question.name} must be one number or a list, got shape "
+                f"{question.value.shape}"
             )
-        least = 0.0
-        allowed = "at least 0"
-        if name == "separation":
-            least = -float(self.surface.h_max)
-            allowed = f"at least -h_max = {least:.6g}, where the model ends"
-        require(name, numbers, numbers >= least, allowed)
-        return Question(name, np.atleast_1d(numbers).astype(float))
+        is_pulled = self.in_units.adhesion is not None
+        question.require_in_range(float(self.surface.h_max), is_pulled)
+        return question.of_block(np.atleast_1d(question.value))
 
     def _take_theory(self) -> None:
         """Take the theory, or the default one, and its options that are not left to the plan."""
@@ -236,7 +228,7 @@ class Scene:
         changed: Mapping[str, Any] = {}
         if theory is None:
             given_name = None if self.question is None else self.question.name
-            options = [OF_SUMS] if self.of_sums else []
+            options = [OF_SUMS] if self._given(*OF_ISLANDS) else []
             theory = default_name(self.surface, given_name, options)
         elif isinstance(theory, str) and not is_table(theory):
             require_name("theory", theory, (*THEORIES, *OF_MAPS))
@@ -254,7 +246,6 @@ class Scene:
             raise InputError(
                 "outside: a scene solves the islands that no table covers: leave it out"
             )
-        rtol: float | None = DEFAULT_RTOL if self.sums_islands else DEFAULT_RTOL_OF_OTHERS
         given = {"rtol": self.rtol, "seconds": self.seconds}
         given["rtol of the theory"] = self.options.get("rtol")
         names = [name for name, value in given.items() if value is not None]
@@ -263,10 +254,12 @@ class Scene:
                 f"{' and '.join(names)} are given: give the accuracy or the time budget, "
                 "one of them"
             )
+        default = DEFAULT_RTOL if self.sums_islands else DEFAULT_RTOL_OF_OTHERS
+        rtol: float | None = default
         if self.seconds is not None:
             number_in("seconds", self.seconds, 1e-9, MAX_SECONDS)
             rtol = None
-            if self.island_model is not None and not self.is_measured:
+            if not isinstance(self.island_model, MEASURED_MODELS):
                 raise InputError(
                     "the cost of your own island model is not known: give rtol instead "
                     "of seconds"
@@ -285,16 +278,16 @@ class Scene:
                 f"the scene is by theory {self.theory_name!r} itself: leave it out of "
                 "theories"
             )
-        of_sums = " and ".join(self.of_sums)
-        if of_sums and not self.sums_islands:
+        of_islands = " and ".join(self._given(*OF_ISLANDS))
+        if of_islands and not self.sums_islands:
             owner = default_name(self.surface, options=[OF_SUMS])
             raise InputError(
-                f"{of_sums}: of theory {owner!r}, not of {self.theory_name!r}: leave out"
+                f"{of_islands}: of theory {owner!r}, not of {self.theory_name!r}: leave out"
             )
-        if of_sums and self.yields:
+        if of_islands and self.in_units.yields:
             raise InputError(
-                f"{of_sums}: of elastic contacts, and the bodies have a hardness: leave one "
-                "of the two out"
+                f"{of_islands}: of elastic contacts, and the bodies have a hardness: leave "
+                "one of the two out"
             )
 
     def _check_refinements(self) -> None:
@@ -310,7 +303,7 @@ class Scene:
         if "finite_height" not in self.without:
             return
         others = [n for n in self.quantities if n not in ("pressure", "area")]
-        if self.question is not None and not self.question.is_gap:
+        if self.question is not None and self.is_inverted:
             others.append(f"a given {self.question.name}")
         if others:
             raise InputError(
@@ -320,33 +313,14 @@ class Scene:
 
     @property
     def state(self) -> Contact:
-        """A contact of the scene that was not computed, by which needs are checked."""
-        return Contact(Setup(self.surface, self.in_units, self.theory), {})
-
-    @property
-    def E_star(self) -> float:
-        """The effective modulus, in the unit of stresses."""
-        return float(self.in_units.E_star)
-
-    @property
-    def yields(self) -> bool:
-        """Whether the bodies have a hardness that is not infinite."""
-        return self.in_units.yields
+        """A contact of the scene at its highest point, by which needs are checked."""
+        setup = Setup(self.surface, self.in_units, self.theory)
+        return Contact(setup, {"mean_separation": self.surface.h_max})
 
     @property
     def island_model(self) -> Any:
         """The island model that the theory was given; None where the plan chooses."""
         return self.options.get(OF_SUMS)
-
-    @property
-    def is_measured(self) -> bool:
-        """Whether the cost of the given island model is known."""
-        return isinstance(self.island_model, str | UniversalModel | Island4dModel)
-
-    @property
-    def variant(self) -> Variant:
-        """The variant of the paper's equations."""
-        return get_variant(self.options.get("variant", "reported"))
 
     @property
     def sums_islands(self) -> bool:
@@ -364,20 +338,6 @@ class Scene:
         return self.question is not None and not self.question.is_gap
 
     @property
-    def of_sums(self) -> list[str]:
-        """Given arguments that only theories which sum islands have."""
-        given = {"deltas": self.deltas is not None, "points": self.points is not None}
-        given["without"] = bool(self.without)
-        return [name for name, is_given in given.items() if is_given]
-
-    @property
-    def requested_by_arguments(self) -> list[str]:
-        """Steps that an argument requests, beside the quantities of contacts."""
-        given = {"deltas": self.deltas is not None, "points": self.points is not None}
-        given["theories"] = bool(self.theories)
-        return [step for name, step in BY_ARGUMENTS.items() if given[name]]
-
-    @property
     def is_hertz_area(self) -> bool:
         """Whether the area is that of the summits, which has a step of its own."""
         return "area" in self.quantities and "subscale_area" in self.without
@@ -385,16 +345,16 @@ class Scene:
     @property
     def of_contact(self) -> tuple[str, ...]:
         """Requested quantities that are read from one contact."""
-        if not self.is_hertz_area:
-            return tuple(self.quantities)
-        return tuple(name for name in self.quantities if name != "area")
+        of_summits = ("area",) if self.is_hertz_area else ()
+        return tuple(name for name in self.quantities if name not in of_summits)
 
     @property
     def not_requested(self) -> list[str]:
         """What such a contact shows with a model uncertainty, and other steps, that are not requested."""
         state = self.state
         # gaps are there without being asked for
-        requested = {*self.quantities, *self.requested_by_arguments, "mean_separation"}
+        requested = {*self.quantities, "mean_separation"}
+        requested |= {BY_ARGUMENTS[name] for name in self._given(*BY_ARGUMENTS)}
         shown = [
             name
             for name, declared in registry().items()
@@ -404,14 +364,15 @@ class Scene:
         return [name for name in (*shown, *others) if name not in requested]
 
     def computes(self, part: str) -> bool:
-        """Whether a quantity is requested, or one that is made of it."""
-        return any(is_made_of(name, part) for name in self.quantities)
+        """Whether a quantity is requested, or one that is made of it by its declaration."""
+        of_leakage = {LEAKAGE: "flow_coefficient"}
+        names = [of_leakage.get(name, name) for name in self.quantities]
+        return any(part in names_of_parts(name) for name in names)
 
     @property
     def needs_slopes(self) -> bool:
         """Whether derivatives are computed: of all quantities but some, as far as is known here."""
-        others = {*self.quantities} - {"pressure", "area", "energy", "valid", LEAKAGE}
-        return bool(others)
+        return not {*self.quantities} <= {"pressure", "area", "energy", "valid", LEAKAGE}
 
     @classmethod
     def from_toml(cls, path: os.PathLike[str] | str) -> Scene:

@@ -129,10 +129,10 @@ def island(
     require("delta", approach, approach >= SMALLEST_DELTA, f"at least {SMALLEST_DELTA:g}")
     broadcast_shape(delta=approach, surface=surface.h_rms, E_star=modulus)
     shape = broadcast_shape(delta=approach, surface=surface.h_rms)
-    g, s, q0 = islands_of(surface, np.broadcast_to(approach, shape), rule)
     if isinstance(surface, MeasuredSurface):
         refuse_bands(model)
-    phi = answer_islands(model, g)
+    g, s, q0 = islands_of(surface, np.broadcast_to(approach, shape), rule)
+    force, area, error = loads_of(model, g, s, q0)
     sizes = {
         "R_d": 1 / (s * q0**2),
         "R_u": 1 / (s * q0**2),
@@ -143,9 +143,9 @@ def island(
     values = {name: (g[name] * sizes.get(name, 1.0))[()] for name in GEOMETRY}
     return Island(
         delta=np.broadcast_to(np.asarray(delta, dtype=float), shape)[()],
-        force=(modulus * s / q0 * scale_force(g) * phi.phi_F)[()],
-        area=(scale_area(g) * phi.phi_A / q0**2)[()],
-        error=np.asarray(phi.error)[()],
+        force=(modulus * force)[()],
+        area=area[()],
+        error=np.asarray(error)[()],
         **values,
         **named,
     )
@@ -164,6 +164,15 @@ def islands_of(
     )
     g = geometry(np.asarray(delta / surface.h_rms), hurst, zeta_1, variant)
     return g | {"hurst": hurst}, surface.s, surface.q0
+
+
+def loads_of(
+    model: AnyModel, g: dict[str, FloatArray], s: Any, q0: Any, outside: str = "raise"
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """F^i over E* and A^i (40) of `islands_of`, and a bound on the relative error of both."""
+    phi = answer_islands(model, g, outside)
+    force = s / q0 * scale_force(g) * phi.phi_F
+    return force, scale_area(g) * phi.phi_A / q0**2, phi.error
 
 
 def check_band(surface: Any, variant: Variant) -> None:

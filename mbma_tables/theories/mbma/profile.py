@@ -32,8 +32,9 @@ from mbma_tables.islands.geometry import (
 )
 from mbma_tables.islands.island_models import AnyModel, answer_islands
 from mbma_tables.islands.variants import Variant
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.spectrum import Place
-from mbma_tables.surfaces.surface import MeasuredSurface
+from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.tables.universal import UniversalModel
 from mbma_tables.theories.mbma.island import refuse_bands, scale_area, scale_force
 
@@ -52,6 +53,15 @@ Fields = Callable[[FloatArray, NDArray[np.bool_]], tuple[FloatArray, float]]
 # islands at nodes: weights (rows, nodes), shift and rate of heights, and how many lie below
 # each panel, and in all
 Nodes = tuple[FloatArray, FloatArray, FloatArray, NDArray[np.int64]]
+
+
+def shape_of(surface: AnySurface) -> Shape:
+    """One surface as `profile` takes it."""
+    if not isinstance(surface, Surface):
+        assert isinstance(surface, MeasuredSurface)
+        return surface
+    peak = float(surface.h_max / surface.h_rms)
+    return float(surface.hurst), float(surface.zeta_1), peak
 
 
 def _series_matrices(gap_points: FloatArray) -> tuple[FloatArray, FloatArray]:

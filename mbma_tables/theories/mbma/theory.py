@@ -35,7 +35,7 @@ from mbma_tables.theories.base import (
 from mbma_tables.theories.inversion import Curve
 from mbma_tables.theories.mbma.island import check_band
 from mbma_tables.theories.mbma.models import get_model, with_table
-from mbma_tables.theories.mbma.profile import profile
+from mbma_tables.theories.mbma.profile import profile, shape_of
 from mbma_tables.theories.mbma.sums import QUADRATURE_SHARE, Sums, Totals, totals_at
 
 SCAN = 49  # compressions at which force, area and stiffness are searched for a maximum
@@ -170,14 +170,12 @@ class Mbma(Theory):
         h_max = float(surface.h_max)
         h_rms = float(surface.h_rms)
         stress = 1.0
-        shape: Any = surface
         if isinstance(surface, Surface):
             check_band(surface, self.variant)
             # totals of a self-affine surface are over q0 s, too
             stress = float(surface.q0 * surface.s)
-            shape = float(surface.hurst), float(surface.zeta_1), h_max / h_rms
         outside = "exact" if self.outside == "exact" else "nan"
-        totals = profile(shape, model, self.variant, rtol_of_sums, outside)
+        totals = profile(shape_of(surface), model, self.variant, rtol_of_sums, outside)
         # rounding may pass full compression
         end = min(float(totals.edges[-1]) * h_rms, 2 * h_max)
 
