@@ -229,6 +229,11 @@ def curve_command(
 @options.load_options(options.numbers_option)
 @options.results_option
 @options.conductivity_option
+@click.option(
+    "--gas",
+    type=click.Choice(["air", "argon", "helium", "nitrogen", "vacuum"]),
+    help="In the gaps: with a conductivity adds gas and total conductance.",
+)
 @options.specimen_options
 @options.theory_options
 @options.json_option("a table")
@@ -236,6 +241,7 @@ def sensitivity_command(
     loads: dict[str, Any],
     quantity: list[str] | None,
     conductivity: list[float | str] | None,
+    gas: str | None,
     specimen: Specimen,
     model: options.Model,
     as_json: bool,
@@ -260,6 +266,7 @@ def sensitivity_command(
     found = sensitivity(
         specimen.surface,
         model.bodies(specimen, conductivity),
+        gas=gas,
         theory=model.theory,
         quantities=quantity,
         **given,

@@ -64,6 +64,7 @@ from mbma_tables.contacts.result import Contact
 from mbma_tables.design.body_numbers import BodyNumbers
 from mbma_tables.design.derivatives import Described
 from mbma_tables.design.functions import ContactFunction
+from mbma_tables.design.labels import Labels
 from mbma_tables.design.sensitivity import Sensitivity, sensitivity_of
 from mbma_tables.design.specimen import is_of_numbers, surface_of_entries
 from mbma_tables.design.uncertainty import (
@@ -272,11 +273,15 @@ class Joint(JointQuantities, Displayed):
         object.__setattr__(self, "assumed", assumed)
 
     @property
+    def _typed(self) -> dict[str, Any]:
+        """The arguments that have numbers."""
+        names = (*FACES, "nominal_area", "friction", "gas", "bodies")
+        return {name: getattr(self, name) for name in names}
+
+    @property
     def _entries(self) -> dict[str, Any]:
         """What was typed, of which numbers may be distributions."""
-        names = (*FACES, "nominal_area", "friction", "gas")
-        entries = {name: getattr(self, name) for name in names}
-        return entries | {"bodies": entries_of_bodies(self.bodies)}
+        return self._typed | {"bodies": entries_of_bodies(self.bodies)}
 
     def _with(self, numbers: Mapping[str, Any]) -> Joint:
         """The joint of numbers in place of its inputs."""
@@ -787,7 +792,11 @@ class Joint(JointQuantities, Displayed):
         'conductance goes like Rq^-0.67'
         """
         self.require_known("a sensitivity")
-        return sensitivity_of(self.described("pressure", pressure), quantities)
+        labels = Labels.of(*self._typed.values(), pressure)
+        typed = {name: labels.plain(each) for name, each in self._typed.items()}
+        joint = self if labels.template is None else dataclasses.replace(self, **typed)
+        described = joint.described("pressure", labels.plain(pressure))
+        return sensitivity_of(described, quantities, labels)
 
     def function(
         self,

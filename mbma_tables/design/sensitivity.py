@@ -10,15 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mbma_tables.bodies.bodies import Bodies
-from mbma_tables.common.arguments import hinted, is_labelled
+from mbma_tables.common.arguments import hinted
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units
 from mbma_tables.contacts.quantities import registry
-from mbma_tables.contacts.quantities.interface import NOTHING_BETWEEN
+from mbma_tables.contacts.quantities.interface import Gas, Interface
 from mbma_tables.contacts.quantities.registry import unit_of
 from mbma_tables.contacts.question import Question
 from mbma_tables.design.body_numbers import BodyNumbers
 from mbma_tables.design.derivatives import Described, derivatives_of
+from mbma_tables.design.labels import Labels
+from mbma_tables.design.specimen import surface_of_entries
 from mbma_tables.design.unknowns import Unknowns, unknowns_of
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import resolve
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from mbma_tables.contacts.result import Contact
 
 MOST_SHOWN = 10  # contacts whose tables a text has
+NO_LABELS = Labels(None)
 SIDES = {1: "increasing", -1: "decreasing"}
 
 
@@ -143,13 +146,14 @@ def _at(values: Any, entry: tuple[int, ...]) -> float:
 
 @hinted
 def sensitivity(
-    surface: AnySurface,
+    surface: AnySurface | Mapping[str, Any],
     bodies: Bodies | ArrayLike | str = 1.0,
     *,
     separation: ArrayLike | None = None,
     mean_separation: ArrayLike | None = None,
     pressure: ArrayLike | None = None,
     area: ArrayLike | None = None,
+    gas: str | Gas | Mapping[str, Any] | None = None,
     theory: str | Theory | UserTheory | None = None,
     quantities: Sequence[str] | None = None,
 ) -> Sensitivity:
@@ -157,9 +161,10 @@ def sensitivity(
 
     Parameters
     ----------
-    surface : Surface
-        One surface, or a batch of five numbers. Its parameters are its five numbers, or
-        those of the drawing that it was made from (`Surface.from_roughness`). Those of one
+    surface : Surface or mapping
+        One surface, or a batch; or by name the arguments of `Surface.from_roughness`, of
+        `Surface` or of `Surface.from_moments`. Its parameters are its five numbers, or
+        those of the drawing that it was made from. Those of one
         given by a spectrum are
         "heights" and "lengths", factors of all heights and of all lengths along the plane,
         like an instrument's calibration factors; h_max alone; the "shortest" and "longest"
@@ -174,6 +179,9 @@ def sensitivity(
         Poisson's ratios "part_a.nu" and "part_b.nu" where the modulus is that of two bodies;
         "hardness"; "nu" for the tangential stiffness; "conductivity", or "part_a.conductivity"
         and "part_b.conductivity".
+    gas : str, Gas or mapping, optional
+        In the gaps, as for `Joint`: adds `gas_conductance` and `total_conductance`, and of a
+        `Gas` the numbers "temperature", "gas_pressure" and "accommodation".
     theory : str or theory, optional
         As for `contact`, with the same default. The simulation of a map answers for its
         heights and lengths by similarity, without a hardness.
@@ -186,14 +194,15 @@ def sensitivity(
     -------
     Sensitivity
         Derivatives have errors of at most 1e-6 of answer/number where the theory is smooth,
-        which `errors` estimates. At the ends of what is defined, where contact begins or
+        which `errors` estimates. Where any number is a DataArray, all of them are, with its
+        dimensions and coordinates. At the ends of what is defined, where contact begins or
         ends, and where the derivative of the theory jumps, they are those of one side, which
         `sides` names.
 
     Raises
     ------
     InputError, OutOfRangeError
-        As `contact`; for DataArrays, unknown names, quantities that need what was not given,
+        As `contact`; for plain arrays beside DataArrays, unknown names, quantities that need what was not given,
         and for the simulation of a map with a hardness.
 
     Examples
@@ -224,8 +233,14 @@ def sensitivity(
         "pressure": pressure,
         "area": area,
     }
-    described = described_contact(surface, bodies, candidates, theory)
-    return sensitivity_of(described, quantities)
+    labels = Labels.of(surface, bodies, candidates, gas)
+    surface, bodies, candidates, gas = (
+        labels.plain(each) for each in (surface, bodies, candidates, gas)
+    )
+    if isinstance(surface, Mapping):
+        surface = surface_of_entries(surface)
+    described = described_contact(surface, bodies, candidates, theory, gas)
+    return sensitivity_of(described, quantities, labels)
 
 
 def described_contact(
@@ -233,25 +248,29 @@ def described_contact(
     bodies: Any,
     candidates: Mapping[str, Any],
     theory: str | Theory | UserTheory | None,
+    gas: str | Gas | Mapping[str, Any] | None = None,
 ) -> Described:
     """All numbers of contacts at the one candidate that is given."""
+    between = Interface(gas=None if gas is None else Gas.of(gas))
     in_units = Bodies.of(bodies).in_units(surface)
     question = Question.of(in_units.units, candidates)
     chosen = resolve(theory, surface, question.name)
-    described = Described.of(
+    return Described.of(
         surface,
         unknowns_of(surface, chosen),
-        BodyNumbers.of(in_units, NOTHING_BETWEEN),
+        BodyNumbers.of(in_units, between, isinstance(gas, str)),
         chosen,
         question.name,
         question.value,
     )
-    _require_plain(described.numbers)
-    return described
 
 
-def sensitivity_of(described: Described, quantities: Sequence[str] | None) -> Sensitivity:
-    """Values and derivatives of what is described."""
+def sensitivity_of(
+    described: Described,
+    quantities: Sequence[str] | None,
+    labels_of_arrays: Labels = NO_LABELS,
+) -> Sensitivity:
+    """Values and derivatives of what is described, with labels that its numbers had."""
     pressed = described.contact()
     wanted = _names(pressed, quantities, described.unknowns, described.by)
     found = derivatives_of(described, wanted, pressed)
@@ -277,38 +296,49 @@ def sensitivity_of(described: Described, quantities: Sequence[str] | None) -> Se
                 answer: np.abs(ratio) * found.errors[name][answer]
                 for answer, ratio in ratios.items()
             }
-    return Sensitivity(
+    found_units = {name: registry.get(name).unit(pressed) for name in wanted}
+
+    def plain(values: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, Any]:
+        """Numbers of one contact, arrays, or DataArrays with their units."""
+        return {
+            name: labels_of_arrays.labelled(_number(value), units.get(name, "1"))
+            for name, value in values.items()
+        }
+
+    made = Sensitivity(
         described.by,
-        _plain(numbers),
-        _plain(found.values),
-        {label: _plain(row) for label, row in slopes.items()},
-        {label: _plain(row) for label, row in errors.items()},
-        {labels[name]: _plain(row) for name, row in found.derivatives.items()},
+        {},
+        plain(found.values, found_units),
+        {label: plain(row, {}) for label, row in slopes.items()},
+        {label: plain(row, {}) for label, row in errors.items()},
+        {},
         {
-            labels[name]: int(side) if side.ndim == 0 else side
+            labels[name]: labels_of_arrays.labelled(int(side) if side.ndim == 0 else side)
             for name, side in found.sides.items()
         },
         described.body_numbers.bodies.units,
         dict(described.body_numbers.units),
-        {name: registry.get(name).unit(pressed) for name in wanted},
+        found_units,
     )
+    own = {label: made.unit(label) for label in numbers}
+    made.parameters.update(plain(numbers, own))
+    for name, row in found.derivatives.items():
+        label = labels[name]
+        units = {answer: _ratio(unit, own[label]) for answer, unit in found_units.items()}
+        made.derivatives[label] = plain(row, units)
+    return made
 
 
-def _require_plain(numbers: Mapping[str, Any]) -> None:
-    """Reject DataArrays, whose derivatives have no place yet."""
-    if any(map(is_labelled, numbers.values())):
-        raise InputError(
-            "derivatives are of numbers or plain arrays, and these have DataArrays: give "
-            "their values"
-        )
+def _ratio(above: str, below: str) -> str:
+    """The unit of a derivative."""
+    if below in ("", "1"):
+        return above
+    return f"({above})/({below})" if above not in ("", "1") else f"1/({below})"
 
 
-def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Arrays, or numbers of one contact."""
-    return {
-        name: float(value) if np.ndim(value) == 0 else np.array(value)
-        for name, value in values.items()
-    }
+def _number(value: Any) -> Any:
+    """An array, or the number of one contact."""
+    return float(value) if np.ndim(value) == 0 else np.array(value)
 
 
 def _names(

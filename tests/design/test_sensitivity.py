@@ -10,7 +10,7 @@ import xarray as xr
 from catalogue import LEVEL, OWN
 from helpers import difference_weights, random_map, refusals, run, sensitivity_of
 
-from mbma_tables import Bodies, InputError, Surface, contact, sensitivity
+from mbma_tables import Bodies, Gas, InputError, Joint, Surface, contact, sensitivity
 from mbma_tables.islands.geometry import kinks
 from mbma_tables.islands.variants import get_variant
 from mbma_tables.theories import THEORIES, Mbma
@@ -205,9 +205,77 @@ test_what_is_refused = refusals(
     ({"pressure": 0.1, "quantities": ["total_conductance"]}, "needs conductivity"),
     ({"pressure": 0.1, "area": 0.1}, "got pressure and area"),
     ({"pressure": [0.1, np.nan]}, "pressure"),
-    ({"pressure": xr.DataArray([0.1, 0.2], dims="load")}, "have DataArrays"),
-    ({"pressure": 0.1, "surface": LABELLED}, "has DataArrays"),
+    (
+        {"pressure": [0.1, 0.2], "bodies": np.array([1.0, 2.0]), "surface": LABELLED},
+        "array of shape",
+    ),
 )
+
+
+def test_labels_are_those_of_the_numbers():
+    """Every row and column against plain arrays, in the order of the dimensions."""
+    hurst = xr.DataArray([0.7, 0.8], {"part": ["a", "b"]}, dims="part")
+    load = xr.DataArray([5.0, 10.0, 20.0], {"load": [1, 2, 3]}, attrs={"units": "MPa"})
+    hardness = xr.DataArray([1.0, 2.0], dims="steel", attrs={"units": "GPa"})
+    surface = Surface(hurst, 0.06, 12.0, 0.5, 1.7, unit="um")
+    bodies = Bodies("100 GPa", hardness=hardness, conductivity="45 W/(m K)")
+    found = sensitivity(surface, bodies, pressure=load, gas="air", theory="calibrated")
+    steel = [[["1 GPa"]], [["2 GPa"]]]
+    plain = sensitivity(
+        Surface(np.array([0.7, 0.8]), 0.06, 12.0, 0.5, 1.7, unit="um"),
+        Bodies("100 GPa", hardness=steel, conductivity="45 W/(m K)"),
+        pressure=[["5 MPa"], ["10 MPa"], ["20 MPa"]],
+        gas="air",
+        theory="calibrated",
+    )
+    assert set(found.slopes) == set(plain.slopes)
+    assert "total_conductance" in found.answers
+    order = ("steel", "load", "part")
+    for number, row in plain.derivatives.items():
+        for name, values in row.items():
+            labelled = found.derivatives[number][name]
+            assert labelled.part.values.tolist() == ["a", "b"]
+            np.testing.assert_allclose(
+                labelled.transpose(*order), values, rtol=1e-9, atol=1e-30
+            )
+    assert found.derivatives["hurst"]["total_conductance"].attrs["units"] == "W/(m^2 K)"
+    assert found.derivatives["hardness"]["mean_separation"].attrs["units"] == "(um)/(GPa)"
+
+
+def test_labels_of_a_joint_reach_its_derivatives():
+    face = {"Ra": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+
+    def joint(hardness):
+        bodies = Bodies(metals="steel 1020", hardness=hardness)
+        return Joint(face, face, bodies=bodies, nominal_area="4 cm^2")
+
+    hardness = xr.DataArray([1.2, 1.6], {"temper": [1, 2]}, attrs={"units": "GPa"})
+    load = xr.DataArray([10.0, 20.0], {"load": ["low", "high"]}, attrs={"units": "MPa"})
+    found = joint(hardness).sensitivity(load)
+    by_Ra = found.derivatives["part_a.Ra"]["total_conductance"]
+    for temper, number in enumerate((1.2, 1.6), 1):
+        for name, pressure in (("low", "10 MPa"), ("high", "20 MPa")):
+            one = joint(f"{number} GPa").sensitivity(pressure)
+            single = one.derivatives["part_a.Ra"]["total_conductance"]
+            own = float(by_Ra.sel(temper=temper, load=name))
+            assert own == pytest.approx(single, rel=1e-6)
+
+
+def test_total_conductance_of_a_surface_is_that_of_its_joint():
+    face = {"Ra": "0.8 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+    joint = Joint(face, bodies="steel 1020", nominal_area="4 cm^2")
+    gas = Gas("air", temperature=310)
+    asked = {"pressure": "10 MPa", "theory": "calibrated", "gas": gas}
+    found = sensitivity(face | {"nominal_area": "4 cm^2"}, "steel 1020", **asked)
+    of_joint = dataclasses.replace(joint, gas=gas).sensitivity("10 MPa")
+    for number in ("Ra", "hurst", "longest", "shortest"):
+        assert found.slopes[number]["total_conductance"] == pytest.approx(
+            of_joint.slopes[f"part_a.{number}"]["total_conductance"], rel=1e-6
+        )
+    for number in ("temperature", "part_a.conductivity", "pressure"):
+        assert found.slopes[number]["total_conductance"] == pytest.approx(
+            of_joint.slopes[number]["total_conductance"], rel=1e-6
+        )
 
 
 def test_the_command():
