@@ -263,6 +263,21 @@ class Theory(abc.ABC):
         """
         return self.interval(surface, quantity)
 
+    def force_near(self, surface: AnySurface, pressure: FloatArray) -> FloatArray | None:
+        """Mean separations [length] at forces over A0 E*, NaN where there are none, if that takes no search."""
+        return None
+
+    def looks_near(
+        self,
+        surface: AnySurface,
+        quantity: str,
+        wanted: FloatArray,
+        first: FloatArray,
+        farthest: FloatArray,
+    ) -> FloatArray | None:
+        """Initial gaps of a search, from `farthest` to `first`, where it is known near which gaps values are."""
+        return None
+
     def highest(self, surface: AnySurface) -> FloatArray:
         """Mean separation of first contact [length], where contact ends: h_max, of surfaces that did not yield."""
         return np.asarray(surface.h_max, dtype=float)
@@ -444,8 +459,11 @@ class Theory(abc.ABC):
 
         # without a last contact from 12 h_rms on, which 2e-33 of Gaussian heights exceed
         farthest = last if self.ends_at_h_max else np.minimum(last, 12.0 * surface.h_rms)
-        count = self.looks_of_batch if surface.shape else self.looks
-        samples, exact = inversion.sampled(curve, first, farthest, count, shape)
+        looks = self.looks_near(surface, quantity, wanted, first, farthest)
+        if looks is None:
+            count = self.looks_of_batch if surface.shape else self.looks
+            looks = inversion.spaced(first, farthest, count, shape)
+        samples, exact = inversion.sampled(curve, looks, shape)
 
         # goals beyond the value at the smallest gap, whose answer is that gap or an error
         at_end = goal > samples[1][-1].ravel()

@@ -25,23 +25,26 @@ Curve = Callable[[FloatArray], tuple[FloatArray, FloatArray, bool]]
 Indices = FloatArray | NDArray[np.integer]
 
 
+def spaced(
+    first: FloatArray, farthest: FloatArray, count: int, shape: tuple[int, ...]
+) -> FloatArray:
+    """The initial gaps of a search, in order from `farthest` to `first` along a new first axis."""
+    shares = _shares(count).reshape(-1, *[1] * len(shape))
+    return np.asarray(first + (farthest - first) * shares)
+
+
 def sampled(
-    curve: Curve,
-    first: FloatArray,
-    farthest: FloatArray,
-    count: int,
-    shape: tuple[int, ...],
+    curve: Curve, gaps: FloatArray, shape: tuple[int, ...]
 ) -> tuple[FloatArray, bool]:
     """The initial gaps of a search with their values and slopes, (3, gaps, entries).
 
-    In order from `farthest` to `first`; with them, whether the slopes are exact.
+    Gaps are in order from last contact on; with them, whether the slopes are exact.
     """
-    shares = _shares(count).reshape(-1, *[1] * len(shape))
-    gaps = np.asarray(first + (farthest - first) * shares)
+    count = len(gaps)
     value, slope, exact = curve(gaps)
     # one column of gaps for all entries, or one for each
-    is_shared = max(gaps.size, np.size(value)) == shares.size
-    columns = shares.shape if is_shared else (shares.size, *shape)
+    is_shared = max(gaps.size, np.size(value)) == count
+    columns = (count, *[1] * len(shape)) if is_shared else (count, *shape)
     samples = np.empty((3, *columns))
     samples[0] = gaps
     samples[1] = value
@@ -151,7 +154,10 @@ class Search:
         tangent = y0 + slope0 * (log_goal - x0)
         next_y = np.where(tight_x > wide_x, straight, tangent)
         if exact:
-            # a polynomial of degree 7 through all four, where it stays between both sides
+            # a tangent or, through all four, a polynomial of degree 7, where it stays
+            # between both sides
+            is_between = (tangent <= wide_y) & (tangent >= tight_y)
+            next_y = np.where(is_between, tangent, next_y)
             curved = _through(around, log_goal)
             rises = (x[1:] > x[:-1]).all(axis=0)
             is_between = rises & (curved <= wide_y) & (curved >= tight_y)

@@ -298,24 +298,28 @@ class Calibrated(Theory):
         """The same, also where u differs from h_max by rounding."""
         if isinstance(surface, MeasuredSurface):
             return _own_law(surface).mean_separation(quantity, wanted)
-        batch = _bound(surface, wanted)
-        flat, owner, shape, own = batch.placed(wanted)
         if quantity == "area":
+            shape = np.broadcast_shapes(wanted.shape, surface.shape)
             light = np.broadcast_to(light_factor(surface.alpha), shape)
-            loads = force_at_area(flat.reshape(shape), light).ravel()
+            loads = force_at_area(np.broadcast_to(wanted, shape), light)
         else:
-            loads = flat / batch.gradient[own]
+            loads = wanted / np.asarray(surface.rms_gradient)
+        u = self._at_loads(surface, loads)
+        require(quantity, spread(wanted, u.shape), ~np.isnan(u), "less: u is 0")
+        return u
+
+    def _at_loads(self, surface: AnySurface, loads: FloatArray) -> FloatArray:
+        """Mean separations [length] at forces over A0 E* g, NaN where these are not reached."""
+        batch = _bound(surface, loads)
+        flat, owner, shape, own = batch.placed(loads)
+        u = batch.separation(owner, flat) * batch.h_rms[own]
         # zero load is last contact
-        u = batch.separation(owner, loads)
-        require(
-            quantity,
-            np.broadcast_to(wanted, shape),
-            ~np.isnan(u).reshape(shape),
-            "less: u is 0",
-        )
-        return np.asarray(
-            np.minimum((u * batch.h_rms[own]).reshape(shape), surface.h_max)
-        )
+        return np.asarray(np.minimum(u.reshape(shape), surface.h_max))
+
+    def force_near(self, surface: AnySurface, pressure: FloatArray) -> FloatArray | None:
+        if isinstance(surface, MeasuredSurface):
+            return None
+        return self._at_loads(surface, pressure / np.asarray(surface.rms_gradient))
 
     def area_at(self, surface: AnySurface, pressure: FloatArray) -> FloatArray:
         if isinstance(surface, MeasuredSurface):

@@ -139,6 +139,14 @@ def bearing_share(
     return share, slope
 
 
+def gap_of_share(share: ArrayLike, h_max: ArrayLike) -> FloatArray:
+    """u [h_rms] of which `bearing_share` is this share of Gaussian heights that end at `h_max`."""
+    rest = ndtr(-_levels(h_max))
+    level = -ndtri(share * (1 - rest) + rest)
+    density = np.exp(-0.5 * level * level) / np.sqrt(2 * np.pi)
+    return np.asarray(level * ndtr(level) + density)
+
+
 def _levels(u: ArrayLike) -> FloatArray:
     """Levels of Gaussian heights at mean gaps [h_rms]."""
     return answered(core.gaussian_levels, (u,))[0]

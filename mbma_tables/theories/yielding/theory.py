@@ -306,6 +306,28 @@ class Yielding(Theory):
         shape = self._refuse(quantity, wanted)
         return super().inverted(surface, quantity, np.broadcast_to(wanted, shape))
 
+    def looks_near(
+        self,
+        surface: AnySurface,
+        quantity: str,
+        wanted: FloatArray,
+        first: FloatArray,
+        farthest: FloatArray,
+    ) -> FloatArray | None:
+        """Where the elastic force or that of the heights alone is the wanted one, which is at most twice their power mean."""
+        near = (
+            self.elastic.force_near(surface, wanted) if quantity == "pressure" else None
+        )
+        if near is None:
+            return None
+        heights = self.elastic.heights(surface)
+        level = law.gap_of_share(wanted / self.hardness, heights)
+        near = np.fmin(near, level * np.asarray(surface.h_rms))
+        # numbers, and between those of the search
+        middle = 0.5 * (first + farthest)
+        inside = (near > first) & (near < farthest)
+        return np.stack(np.broadcast_arrays(np.where(inside, near, middle), first))
+
     def _refuse(self, quantity: str, wanted: FloatArray) -> tuple[int, ...]:
         """The shape of entries, whose pressures are at most the hardness."""
         over = np.asarray(wanted > self.hardness)

@@ -338,6 +338,41 @@ def test_reasons_and_what_elastic_answers_say():
     assert (found.variant, found.island_model) == ("printed", "universal")
 
 
+def test_a_force_with_a_hardness_takes_few_elastic_answers(monkeypatch):
+    """A search begins where the elastic force or that of the heights is the wanted one."""
+    rng = np.random.default_rng(4)
+    size = 200
+    h_rms = rng.uniform(0.5, 2.0, size)
+    # half of them beyond the calibrated table
+    h_max = np.where(np.arange(size) % 2, 3.5, 8.5) * h_rms
+    surfaces = Surface(
+        rng.uniform(0.5, 0.95, size), 0.01, rng.uniform(0.5, 5.0, size), h_rms, h_max
+    )
+    cap = np.where(rng.random(size) < 0.2, np.inf, 10 ** rng.uniform(-2, 0, size))
+    theory = Yielding(resolve("calibrated"), cap)
+    most = np.minimum(cap, np.asarray(surfaces.rms_gradient))
+    wanted = most * 10 ** rng.uniform(-6, -0.1, size)
+    answers = []
+    of_curve = Yielding.curve
+
+    def counted(self, surface, quantity):
+        values = of_curve(self, surface, quantity)
+
+        def count(u):
+            answers.append(np.broadcast(u, surface.h_rms).size)
+            return values(u)
+
+        return count
+
+    monkeypatch.setattr(Yielding, "curve", counted)
+    u = theory.mean_separation_at(surfaces, "pressure", wanted)
+    assert sum(answers) < 6.5 * size
+    found = theory.answer(surfaces, u)
+    # a rounding of u beside last contact
+    rounding = 4e-16 * u * found.stiffness / wanted
+    np.testing.assert_array_less(np.abs(found.pressure / wanted - 1), 1e-12 + rounding)
+
+
 @each
 @pytest.mark.parametrize("cap", [1e-320, 1e-300, 1e-100, 1e100, 1e200, 1.7e308])
 def test_hardnesses_of_any_size(theory, cap):
