@@ -275,7 +275,7 @@ class Theory(abc.ABC):
         first: FloatArray,
         farthest: FloatArray,
     ) -> FloatArray | None:
-        """Initial gaps of a search, from `farthest` to `first`, where it is known near which gaps values are."""
+        """Initial gaps of a search on a batch, from `farthest` to `first`, where it is known near which gaps values are."""
         return None
 
     def highest(self, surface: AnySurface) -> FloatArray:
@@ -459,10 +459,13 @@ class Theory(abc.ABC):
 
         # without a last contact from 12 h_rms on, which 2e-33 of Gaussian heights exceed
         farthest = last if self.ends_at_h_max else np.minimum(last, 12.0 * surface.h_rms)
-        looks = self.looks_near(surface, quantity, wanted, first, farthest)
+        looks = None
+        if surface.shape:
+            looks = self.looks_near(surface, quantity, wanted, first, farthest)
         if looks is None:
             count = self.looks_of_batch if surface.shape else self.looks
-            looks = inversion.spaced(first, farthest, count, shape)
+            shares = inversion.shares(count).reshape(-1, *[1] * len(shape))
+            looks = np.asarray(first + (farthest - first) * shares)
         samples, exact = inversion.sampled(curve, looks, shape)
 
         # goals beyond the value at the smallest gap, whose answer is that gap or an error

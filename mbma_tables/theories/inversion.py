@@ -25,14 +25,6 @@ Curve = Callable[[FloatArray], tuple[FloatArray, FloatArray, bool]]
 Indices = FloatArray | NDArray[np.integer]
 
 
-def spaced(
-    first: FloatArray, farthest: FloatArray, count: int, shape: tuple[int, ...]
-) -> FloatArray:
-    """The initial gaps of a search, in order from `farthest` to `first` along a new first axis."""
-    shares = _shares(count).reshape(-1, *[1] * len(shape))
-    return np.asarray(first + (farthest - first) * shares)
-
-
 def sampled(
     curve: Curve, gaps: FloatArray, shape: tuple[int, ...]
 ) -> tuple[FloatArray, bool]:
@@ -53,7 +45,7 @@ def sampled(
 
 
 @shared()
-def _shares(count: int) -> FloatArray:
+def shares(count: int) -> FloatArray:
     """Points from 1 to 0, denser at either end: equal steps of ln u - ln(h_max - u)."""
     # at 7 the outer ones are 0.1% of the interval from its ends
     logits = np.linspace(-7.0, 7.0, count)
