@@ -9,7 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.common.arguments import FloatArray, number_in
+from mbma_tables.common.arguments import (
+    FloatArray,
+    detached,
+    finite_array,
+    is_labelled,
+    number_in,
+    positive_array,
+    require,
+)
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, factor
 
@@ -40,11 +48,11 @@ class Adhesion:
 
     Parameters
     ----------
-    work : float or str
+    work : float, str or array_like
         Work of adhesion per area, the energy to part two flat faces: "50 mJ/m^2", or a
         number in the unit of `E_star` times that of the surface's lengths. At least 0; at 0
-        there is no attraction.
-    range : float or str
+        there is no attraction. An array broadcasts with the contact.
+    range : float, str or array_like
         Length over which the traction falls, "0.3 nm", or a number in the surface's unit.
     traction : {"exponential", "van der Waals"} or callable, optional
         Of the gap over the range: ``exp(-x)``, by default, or ``2 (1 + x)**-3``, that of
@@ -78,6 +86,8 @@ class Adhesion:
     traction: Any = EXPONENTIAL
 
     def __post_init__(self) -> None:
+        for name in ("work", "range"):
+            object.__setattr__(self, name, detached(getattr(self, name)))
         self.work_in(Units(length="um", stress="MPa"))
         self.range_in(Units(length="um", stress="MPa"))
         if isinstance(self.traction, str):
@@ -126,34 +136,41 @@ class Adhesion:
             return TRACTIONS[self.traction]
         return _normalized(self.traction)
 
-    def work_in(self, units: Units) -> float:
-        """The work in the unit of stresses times that of lengths."""
-        if not isinstance(self.work, str):
-            return _at_least_zero("work", self.work)
-        match = _WORK.fullmatch(self.work.replace("\N{MICRO SIGN}", "u"))
-        if match is None:
-            raise InputError(
-                f"work must be an energy per area such as '50 mJ/m^2', got {self.work!r}"
-            )
-        joules = float(match[1]) * _PREFIXES[match[2]]
-        _at_least_zero("work", joules)
-        if units.length is None or units.stress in (None, "1"):
-            raise InputError(
-                f"work = {self.work!r} beside numbers without units: give the surface its "
-                "unit and E* with its own, such as '100 GPa'"
-            )
-        return (
-            joules * factor("Pa", str(units.stress), "stress") * factor("m", units.length)
-        )
+    def work_in(self, units: Units) -> Any:
+        """The work in the unit of stresses times that of lengths, an array if it is one."""
+        work = _work(self.work, units)
+        if is_labelled(work):
+            return work
+        array = finite_array("work", work)
+        require("work", array, array >= 0, "at least 0")
+        return array[()]
 
-    def range_in(self, units: Units) -> float:
-        """The range in the unit of lengths."""
+    def range_in(self, units: Units) -> Any:
+        """The range in the unit of lengths, an array if it is one."""
         length = units.number("range", self.range)
-        return number_in("range", length, SMALLEST, LARGEST)
+        if is_labelled(length):
+            return length
+        return positive_array("range", length)[()]
 
 
-def _at_least_zero(name: str, value: Any) -> float:
-    return number_in(name, value, 0.0, LARGEST)
+def _work(given: Any, units: Units) -> Any:
+    """A work in the unit of stresses times that of lengths: numbers as they are, lists by entry."""
+    if isinstance(given, list | tuple):
+        return [_work(each, units) for each in given]
+    if not isinstance(given, str):
+        return given
+    match = _WORK.fullmatch(given.replace("\N{MICRO SIGN}", "u"))
+    if match is None:
+        raise InputError(
+            f"work must be an energy per area such as '50 mJ/m^2', got {given!r}"
+        )
+    joules = float(match[1]) * _PREFIXES[match[2]]
+    if units.length is None or units.stress in (None, "1"):
+        raise InputError(
+            f"work = {given!r} beside numbers without units: give the surface its "
+            "unit and E* with its own, such as '100 GPa'"
+        )
+    return joules * factor("Pa", str(units.stress), "stress") * factor("m", units.length)
 
 
 def _hamaker(given: Any) -> float:
@@ -204,8 +221,8 @@ def _normalized(
 class AdhesionInUnits:
     """An attraction as numbers, in the units of a contact."""
 
-    work: float  # [stress length], positive
-    range: float  # [length]
+    work: Any  # [stress length], array_like
+    range: Any  # [length], array_like
     shape: Callable[[FloatArray], FloatArray]  # traction over work/range by gap/range
     is_exponential: bool
 
@@ -216,19 +233,19 @@ class AdhesionInUnits:
             return None
         work = given.work_in(units)
         length = given.range_in(units)
-        if work == 0:
+        if not is_labelled(work) and not np.any(work):
             return None
         return cls(work, length, given.shape, given.traction == EXPONENTIAL)
 
     @property
-    def strength(self) -> float:
+    def strength(self) -> FloatArray:
         """Traction at gap zero [stress]."""
-        return self.work / self.range * float(self.shape(np.zeros(1))[0])
+        return np.asarray(self.work / self.range * float(self.shape(np.zeros(1))[0]))
 
     @property
-    def width(self) -> float:
+    def width(self) -> FloatArray:
         """Work over strength [length], the range of an exponential traction."""
-        return self.work / self.strength
+        return np.asarray(self.range / float(self.shape(np.zeros(1))[0]))
 
 
 def adhesion_of(given: Any) -> Any:

@@ -372,12 +372,40 @@ class BodiesInUnits:
         numbers = {"E_star": self.E_star, "hardness": self.hardness}
         if self.largest is not None:
             numbers["largest_pressure"] = self.largest
+        if self.adhesion is not None:
+            numbers |= {"work": self.adhesion.work, "range": self.adhesion.range}
         return numbers
 
-    def at(self, E_star: Any, hardness: Any, largest: Any = None) -> BodiesInUnits:
+    def at(self, *numbers: Any) -> BodiesInUnits:
         """The same bodies with other numbers, such as those of a block of an array."""
+        given = dict(zip(self.numbers, numbers, strict=True))
+        adhesion = self.adhesion
+        if adhesion is not None:
+            adhesion = dataclasses.replace(
+                adhesion, work=given["work"], range=given["range"]
+            )
         return dataclasses.replace(
-            self, E_star=E_star, hardness=hardness, largest=largest
+            self,
+            E_star=given["E_star"],
+            hardness=given["hardness"],
+            largest=given.get("largest_pressure"),
+            adhesion=adhesion,
+        )
+
+    def checked(self) -> BodiesInUnits:
+        """The same bodies, of arrays whose numbers were checked."""
+        adhesion = self.adhesion
+        if adhesion is not None:
+            work = finite_array("work", adhesion.work)
+            require("work", work, work >= 0, "at least 0")
+            reach = positive_array("range", adhesion.range)
+            adhesion = dataclasses.replace(adhesion, work=work, range=reach)
+        return dataclasses.replace(
+            self,
+            E_star=positive_array("E_star", self.E_star),
+            hardness=checked_hardness(self.hardness),
+            largest=None if self.largest is None else checked_largest(self.largest),
+            adhesion=adhesion,
         )
 
 

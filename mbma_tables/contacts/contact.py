@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.bodies.bodies import Bodies, BodiesInUnits, after, checked_largest
+from mbma_tables.bodies.bodies import Bodies, BodiesInUnits, after
 from mbma_tables.common.arguments import (
     FloatArray,
     any_labelled,
     broadcast_shape,
-    checked_hardness,
     describe_entries,
     hinted,
-    positive_array,
     require,
     spread,
 )
@@ -151,10 +150,9 @@ def contact_of(
     chosen = resolve(theory, surface, question.name)
     surface = chosen.surface_of(surface)
     setup = Setup(surface, in_units, chosen, interface)
-    numbers = in_units.E_star, in_units.hardness, in_units.largest
-    if any_labelled(surface, question.value, *numbers):
+    if any_labelled(surface, question.value, *in_units.numbers.values()):
         return _of_labelled(setup, question)
-    solved, gaps = _solved(setup, surface, question, *numbers)
+    solved, gaps = _solved(setup, question)
     values = {
         "pressure": solved.pressure,
         "area": solved.area,
@@ -178,36 +176,26 @@ def contact_where_finite(
     return Contact(setup, {"separation": separation, "mean_separation": u}, answer=answer)
 
 
-def _solved(
-    setup: Setup,
-    surface: AnySurface,
-    question: Question,
-    E_star: Any,
-    hardness: Any,
-    largest: Any = None,
-) -> tuple[Solved, Gaps]:
+def _solved(setup: Setup, question: Question) -> tuple[Solved, Gaps]:
     """The contact of plain arrays at a given quantity, and its separations.
 
-    Modulus and hardness are checked already.
+    The numbers of the bodies are checked already.
     """
-    modulus = np.asarray(E_star)
-    cap = np.asarray(hardness if setup.bodies.yields else np.inf)
+    bodies = setup.bodies
+    surface = setup.surface
+    modulus = np.asarray(bodies.E_star)
+    cap = np.asarray(bodies.hardness if bodies.yields else np.inf)
     shape = broadcast_shape(
-        **{
-            question.name: question.value,
-            "surface": surface.h_rms,
-            "E_star": modulus,
-            "hardness": cap,
-            "largest_pressure": 0.0 if largest is None else np.asarray(largest),
-        }
+        **{question.name: question.value, "surface": surface.h_rms},
+        **{name: np.asarray(number) for name, number in bodies.numbers.items()},
     )
     question = Question(question.name, spread(question.value, shape))
     modulus = spread(modulus, shape)
     theory = setup.theory
-    if setup.bodies.yields:
-        theory = with_hardness(theory, cap, modulus, largest)
-    elif setup.bodies.adhesion is not None:
-        theory = with_adhesion(theory, setup.bodies.adhesion, modulus)
+    if bodies.yields:
+        theory = with_hardness(theory, cap, modulus, bodies.largest)
+    elif bodies.adhesion is not None:
+        theory = with_adhesion(theory, bodies.adhesion, modulus)
     gaps = _separations(setup, theory, surface, question, modulus, cap)
     return theory.solved(surface, gaps, modulus), gaps
 
@@ -294,14 +282,11 @@ def _of_labelled(setup: Setup, question: Question) -> Contact:
     """The contact of DataArrays, lazy where they are."""
     bodies = setup.bodies
 
-    def solve(
-        block: AnySurface, given: Any, E_star: Any, hardness: Any, *largest: Any
-    ) -> tuple[Any, ...]:
-        modulus = positive_array("E_star", E_star)
-        cap = checked_hardness(hardness)
-        before = [checked_largest(pressure) for pressure in largest]
-        asked = question.of_block(given)
-        solved, gaps = _solved(setup, block, asked, modulus, cap, *before)
+    def solve(block: AnySurface, given: Any, *numbers: Any) -> tuple[Any, ...]:
+        own = dataclasses.replace(
+            setup, surface=block, bodies=bodies.at(*numbers).checked()
+        )
+        solved, gaps = _solved(own, question.of_block(given))
         answer = solved.pressure, solved.area, solved.error
         return (gaps.separation, gaps.mean_separation, *answer)
 

@@ -82,8 +82,8 @@ class Setup:
 
     def theory_of(self, bodies: BodiesInUnits) -> Theory:
         """The theory, with the bodies' hardness or adhesion where they have one."""
-        if self.bodies.adhesion is not None:
-            return with_adhesion(self.theory, self.bodies.adhesion, bodies.E_star)
+        if bodies.adhesion is not None:
+            return with_adhesion(self.theory, bodies.adhesion, bodies.E_star)
         if not self.bodies.yields:
             return self.theory
         broadcast_shape(**bodies.numbers)

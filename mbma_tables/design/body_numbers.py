@@ -47,6 +47,8 @@ class BodyNumbers:
         numbers |= _moduli(bodies)
         if bodies.yields:
             numbers["hardness"] = bodies.hardness
+        if bodies.adhesion is not None:
+            numbers |= {"work": bodies.adhesion.work, "range": bodies.adhesion.range}
         conductivities, unit, metre = _conductivities(bodies)
         numbers |= conductivities
         units = dict.fromkeys(conductivities, unit)
@@ -58,6 +60,7 @@ class BodyNumbers:
             }
         units |= {"temperature": "K", "gas_pressure": "Pa", "accommodation": "1"}
         units |= dict.fromkeys((*POISSONS_RATIOS, "nu"), "1")
+        units["work"] = f"{bodies.units.stress} {bodies.units.length}"
         return cls(bodies, interface, numbers, units, metre)
 
     def of_columns(
@@ -69,6 +72,7 @@ class BodyNumbers:
             E_star=self._modulus(columns),
             hardness=columns.get("hardness", np.inf),
             k_s=self._conductivity(columns),
+            adhesion=self._adhesion(columns),
         )
         gas = self.interface.gas
         if "temperature" not in columns or gas is None:
@@ -120,6 +124,12 @@ class BodyNumbers:
             conductivity=own.conductivity,
         )
         return dataclasses.replace(bodies, bodies=sheared)
+
+    def _adhesion(self, columns: Mapping[str, FloatArray]) -> Any:
+        adhesion = self.bodies.adhesion
+        if adhesion is None:
+            return None
+        return dataclasses.replace(adhesion, work=columns["work"], range=columns["range"])
 
     def _modulus(self, columns: Mapping[str, FloatArray]) -> Any:
         if MODULI[0] not in columns:

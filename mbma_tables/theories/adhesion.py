@@ -12,18 +12,20 @@ that of the elastic theory (`gap_law`, or a simulated map).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize.elementwise import find_minimum, find_root
 
 from mbma_tables.bodies.adhesion import AdhesionInUnits
 from mbma_tables.common.arguments import FloatArray, describe_entries
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import gap_law
-from mbma_tables.theories.base import Theory, TheoryAnswer
+from mbma_tables.theories.base import Theory, TheoryAnswer, select
 from mbma_tables.theories.inversion import Indices
 
 # share of the traction in contact that deforms, fitted to simulations by `python -m generate
@@ -45,10 +47,7 @@ STEP = 1e-3  # relative, of mean gaps for slopes
 LOOKS = 48  # mean gaps at which a contact is looked for
 SMALLEST_GAP = 1e-10  # of them, over h_rms
 FARTHEST = 12.0  # and the largest, likewise, where contact has no end
-SECTIONS = 30  # of the interval that holds pull-off
-MOST_STEPS = 60
 PARTING_NODES = 64
-ROUNDING = 1e-13  # relative, of net pressures that are found
 LAPLACIAN = 8 / 3  # mean square of the Laplacian over m4, of isotropic surfaces
 LEAST_SHARE = 1e-3  # of the attraction at zero load, the least net pressure of laws
 NECKING = (
@@ -88,6 +87,17 @@ def with_adhesion(
     return Adhesive(theory, adhesion, E_star)
 
 
+def _beside_lowest(
+    u: FloatArray, net: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The gap of the lowest net pressure along the first axis between its neighbours."""
+    lowest = np.clip(net.argmin(axis=0), 1, len(net) - 2)
+    before, at, after = (
+        np.take_along_axis(u, (lowest + step)[None], 0)[0] for step in (-1, 0, 1)
+    )
+    return before, at, after
+
+
 class Adhesive(Theory):
     """A theory with an attraction; u is the mean gap, pressures are net ones."""
 
@@ -104,12 +114,23 @@ class Adhesive(Theory):
         self.looks = theory.looks
 
     def at(self, shape: tuple[int, ...], place: Indices) -> Theory:
-        if self.modulus.ndim == 0:
+        if self._shape == ():
             return self
-        chosen = np.broadcast_to(self.modulus, shape).ravel()[
-            np.asarray(place).astype(np.intp)
-        ]
-        return Adhesive(self.elastic, self.adhesion, chosen)
+        flat = np.asarray(place).astype(np.intp)
+        modulus, work, reach = (
+            np.broadcast_to(number, shape).ravel()[flat]
+            for number in (self.modulus, self.adhesion.work, self.adhesion.range)
+        )
+        adhesion = dataclasses.replace(self.adhesion, work=work, range=reach)
+        return Adhesive(self.elastic, adhesion, modulus)
+
+    @property
+    def _shape(self) -> tuple[int, ...]:
+        """That of the numbers of the bodies."""
+        adhesion = self.adhesion
+        return np.broadcast_shapes(
+            self.modulus.shape, np.shape(adhesion.work), np.shape(adhesion.range)
+        )
 
     @property
     def _traction(self) -> FloatArray:
@@ -122,7 +143,9 @@ class Adhesive(Theory):
         """Effective less net pressure over E* at mean gaps and areas of the elastic contact."""
         share, gap = self.elastic.open_gaps(surface, mean_separation, area)
         shape = self.adhesion.shape
-        decay = (share * shape(gap / self.adhesion.range)).sum(axis=-1)
+        # gaps are on an axis of their own
+        reach = np.asarray(self.adhesion.range)[..., None]
+        decay = (share * shape(gap / reach)).sum(axis=-1)
         in_contact = THETA * float(shape(np.zeros(1))[0]) * area
         return np.asarray(self._traction * (decay + in_contact))
 
@@ -136,7 +159,7 @@ class Adhesive(Theory):
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Net pressure, area and -dp/du at mean separations u [length]."""
         u = np.asarray(mean_separation, dtype=float)
-        u = np.broadcast_to(u, np.broadcast_shapes(u.shape, self.modulus.shape))
+        u = np.broadcast_to(u, np.broadcast_shapes(u.shape, self._shape))
         steps = np.stack([u, u * (1 - STEP), u * (1 + STEP)])
         elastic = self.elastic.answer(surface, steps)
         pull = self.pull(surface, steps, elastic.area)
@@ -160,7 +183,7 @@ class Adhesive(Theory):
     def _looked_at(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
         """Mean gaps on a first axis, rising, of surfaces and moduli, and net pressures there."""
         low, high = self._range_of_gaps(surface)
-        shape = np.broadcast_shapes(surface.shape, self.modulus.shape)
+        shape = np.broadcast_shapes(surface.shape, self._shape)
         share = np.linspace(0.0, 1.0, LOOKS).reshape(-1, *(1,) * len(shape))
         u = np.broadcast_to(low * (high / low) ** share, (LOOKS, *shape))
         return u, self.net(surface, u)
@@ -171,20 +194,30 @@ class Adhesive(Theory):
         It is the largest tension of the contact as its gap grows.
         """
         u, net = self._looked_at(surface)
-        lowest = np.clip(net.argmin(axis=0), 1, LOOKS - 2)
-        left, right = (
-            np.log(np.take_along_axis(u, (lowest + k)[None], 0)[0]) for k in (-1, 1)
-        )
-        # golden sections between both neighbours of the lowest look
-        golden = (np.sqrt(5) - 1) / 2
-        for _ in range(SECTIONS):
-            inner = right - golden * (right - left), left + golden * (right - left)
-            values = self.net(surface, np.exp(np.stack(inner)))
-            falls = values[0] > values[1]
-            left = np.where(falls, inner[0], left)
-            right = np.where(falls, right, inner[1])
-        parting = np.exp((left + right) / 2)
+        # twice, as the first look reaches over many decades
+        low, _, high = _beside_lowest(u, net)
+        share = np.linspace(0.0, 1.0, LOOKS).reshape(-1, *(1,) * low.ndim)
+        u = low * (high / low) ** share
+        net = self.net(surface, u)
+        bracket = tuple(np.log(gap) for gap in _beside_lowest(u, net))
+        net_at, place = self._of_entries(surface, low.shape)
+        found = find_minimum(net_at, bracket, args=(place,))
+        # without a bracket the net pressure is lowest at the end of the gaps looked at
+        ends = np.where(net[0] < net[-1], u[0], u[-1])
+        parting = np.where(found.success, np.exp(found.x), ends)
         return np.maximum(-self.net(surface, parting), 0.0), parting
+
+    def _of_entries(
+        self, surface: AnySurface, shape: tuple[int, ...]
+    ) -> tuple[Callable[[FloatArray, FloatArray], FloatArray], FloatArray]:
+        """Net pressures at ln u and flat indices of a shape, for scipy's methods, and all indices."""
+
+        def net_at(log_u: FloatArray, place: FloatArray) -> FloatArray:
+            chosen = place.astype(np.intp)
+            part: Any = self.at(shape, chosen)
+            return np.asarray(part.net(select(surface, shape, chosen), np.exp(log_u)))
+
+        return net_at, np.arange(float(np.prod(shape))).reshape(shape)
 
     def free_gap(self, surface: AnySurface) -> FloatArray:
         """Mean gap at zero load [length]."""
@@ -264,27 +297,15 @@ class Adhesive(Theory):
     def _between(
         self, surface: AnySurface, goal: FloatArray, low: FloatArray, high: FloatArray
     ) -> FloatArray:
-        """Mean gap at a net pressure, between logarithms of gaps, by the Illinois method."""
-        more = self.net(surface, np.exp(low)) - goal
-        less = self.net(surface, np.exp(high)) - goal
-        scale = np.abs(goal) + more - less
-        root = (low + high) / 2
-        raised = np.zeros(np.shape(low))  # the side that the step before moved
-        for _ in range(MOST_STEPS):
-            with np.errstate(invalid="ignore", divide="ignore"):
-                secant = low + (high - low) * more / (more - less)
-            root = np.where(np.isfinite(secant), secant, root)
-            value = self.net(surface, np.exp(root)) - goal
-            if (np.abs(value) <= ROUNDING * scale).all():
-                break
-            above = value > 0
-            # the end that stays for a second step counts half
-            less = np.where(above, np.where(raised > 0, less / 2, less), value)
-            more = np.where(above, value, np.where(raised < 0, more / 2, more))
-            low = np.where(above, root, low)
-            high = np.where(above, high, root)
-            raised = np.where(above, 1.0, -1.0)
-        return np.exp(root)
+        """Mean gap at a net pressure, between logarithms of gaps."""
+        net_at, place = self._of_entries(surface, goal.shape)
+
+        def missed(log_u: FloatArray, wanted: FloatArray, at: FloatArray) -> FloatArray:
+            return net_at(log_u, at) - wanted
+
+        found = find_root(missed, (low, high), args=(goal, place))
+        # pull-off itself is within rounding of the end of its bracket
+        return np.exp(np.where(found.success, found.x, high))
 
     def interval(
         self, surface: AnySurface, quantity: str = "pressure"

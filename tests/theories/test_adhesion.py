@@ -5,6 +5,7 @@ import functools
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 from scipy.integrate import quad
 
 from generate import files
@@ -19,6 +20,7 @@ from mbma_tables import (
     contact,
     contact_law,
     rough_contact,
+    sensitivity,
 )
 from mbma_tables.common.errors import InputError, MissingError, OutOfRangeError
 from mbma_tables.common.units import Units
@@ -30,6 +32,11 @@ FACE = Surface(hurst=0.8, q0=0.1, q1=1.6, h_rms=0.1, h_max=0.35, unit="um")
 WORK, RANGE = "10 mJ/m^2", "10 nm"
 STICKY = Bodies("1 GPa", adhesion=Adhesion(WORK, RANGE))
 pressed = functools.partial(contact, FACE, theory="calibrated")
+
+
+def adhesive(work, reach):
+    """Bodies of 1 GPa; work [GPa um], range [um]."""
+    return Bodies("1 GPa", adhesion=Adhesion(work, reach))
 
 
 def test_without_work_it_is_the_theory_to_the_last_bit():
@@ -129,7 +136,7 @@ def test_laws_joints_and_leakage_go_by_the_same_contact():
 
 
 def test_what_is_refused():
-    for wrong in (np.nan, np.inf, -1e-3, "5 J", "-5 mJ/m^2", [1.0, 2.0]):
+    for wrong in (np.nan, np.inf, -1e-3, "5 J", "-5 mJ/m^2", [1.0, -2.0]):
         with pytest.raises((InputError, OutOfRangeError)):
             Adhesion(wrong, RANGE)
     for wrong in (0.0, np.nan, np.inf, "5 J", -1.0):
@@ -294,3 +301,38 @@ def test_the_solver_against_tamaas_on_the_same_grid():
     pressed_points = (traction > 1e-5 * traction.max()).mean()
     assert pressed_points == pytest.approx(own["area_compressed"], abs=1e-3)
     assert traction.mean() == pytest.approx(own["net_pressure"], rel=1e-4)
+
+
+def test_arrays_of_works_and_ranges_are_those_of_each():
+    works = np.array([[1e-5], [4e-6], [0.0]])
+    ranges = np.array([0.01, 0.02])
+    area = pressed(adhesive(works, ranges), pressure=1e-3).area
+    parting = pressed(adhesive(works, ranges), pressure=1e-3).pull_off
+    assert area.shape == parting.shape == (3, 2)
+    for row, work in enumerate(works[:, 0]):
+        for column, reach in enumerate(ranges):
+            one = pressed(adhesive(work, reach), pressure=1e-3)
+            assert area[row, column] == pytest.approx(one.area, rel=1e-13)
+            if work:
+                assert parting[row, column] == pytest.approx(one.pull_off, rel=1e-9)
+    assert (parting[2] == 0).all()
+    named = xr.DataArray([1e-5, 4e-6], dims="rubber")
+    labelled = pressed(adhesive(named, 0.01), pressure=1e-3).area
+    assert labelled.dims == ("rubber",)
+    np.testing.assert_allclose(labelled, area[:2, 0], rtol=1e-13)
+    with pytest.raises(InputError, match="work must be one number"):
+        contact_law(FACE, adhesive(works, 0.01), "calibrated")
+
+
+def test_derivatives_by_work_and_range_are_slopes_of_contacts():
+    by = sensitivity(FACE, adhesive(1e-5, 0.01), pressure=1e-3, theory="calibrated")
+    step = 1e-3
+    for name, more, less in (
+        ("work", (1e-5 * (1 + step), 0.01), (1e-5 * (1 - step), 0.01)),
+        ("range", (1e-5, 0.01 * (1 + step)), (1e-5, 0.01 * (1 - step))),
+    ):
+        ends = [
+            float(pressed(adhesive(*each), pressure=1e-3).area) for each in (more, less)
+        ]
+        slope = (np.log(ends[0]) - np.log(ends[1])) / np.log((1 + step) / (1 - step))
+        assert by.slopes[name]["area"] == pytest.approx(slope, rel=1e-4)

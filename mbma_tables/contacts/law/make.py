@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbma_tables.bodies.bodies import Bodies, BodiesInUnits, after, checked_largest
-from mbma_tables.common.arguments import FloatArray, checked_hardness, hinted, number_in
+from mbma_tables.bodies.bodies import Bodies, BodiesInUnits, after
+from mbma_tables.common.arguments import FloatArray, hinted, number_in
 from mbma_tables.common.errors import ConvergenceError, InputError, OutOfRangeError
 from mbma_tables.common.shared import frozen
 from mbma_tables.contacts.law import block as fit
@@ -112,19 +112,18 @@ def law_of(
         else Bodies.of(bodies).in_units(surface)
     )
     modulus = number_in("E_star", given.E_star, sys.float_info.min, sys.float_info.max)
-    hardness = checked_hardness(given.hardness)
-    largest = None if given.largest is None else checked_largest(given.largest)
-    for name, number in (("hardness", hardness), ("largest_pressure", largest)):
-        if number is not None and number.ndim:
+    numbers = dict(given.checked().numbers, E_star=modulus)
+    for name, number in numbers.items():
+        if np.ndim(number):
             raise InputError(
-                f"{name} must be one number, got shape {number.shape}: a law is of one surface"
+                f"{name} must be one number, got shape {np.shape(number)}: a law is of one "
+                "surface"
             )
     given.require_one_conductivity()
     one = _one_surface(surface)
     chosen = resolve(theory, surface)
-    before = None if largest is None else float(largest)
     simulated = chosen.surface_of(one)
-    loaded = given.at(modulus, float(hardness), before)
+    loaded = given.at(*map(float, numbers.values()))
     setup = Setup(simulated, loaded, chosen, interface)
     loading = setup.theory_of(setup.bodies)
     least = max(chosen.rtol, MIN_LAW_RTOL, loading.least_rtol)
