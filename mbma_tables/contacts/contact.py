@@ -150,9 +150,10 @@ def contact_of(
     chosen = resolve(theory, surface, question.name)
     surface = chosen.surface_of(surface)
     setup = Setup(surface, in_units, chosen, interface)
-    if any_labelled(surface, question.value, *in_units.numbers.values()):
+    numbers = in_units.numbers
+    if any_labelled(surface, question.value, *numbers.values()):
         return _of_labelled(setup, question)
-    solved, gaps = _solved(setup, question)
+    solved, gaps = _solved(setup, question, numbers)
     values = {
         "pressure": solved.pressure,
         "area": solved.area,
@@ -176,7 +177,9 @@ def contact_where_finite(
     return Contact(setup, {"separation": separation, "mean_separation": u}, answer=answer)
 
 
-def _solved(setup: Setup, question: Question) -> tuple[Solved, Gaps]:
+def _solved(
+    setup: Setup, question: Question, numbers: Mapping[str, Any]
+) -> tuple[Solved, Gaps]:
     """The contact of plain arrays at a given quantity, and its separations.
 
     The numbers of the bodies are checked already.
@@ -187,9 +190,10 @@ def _solved(setup: Setup, question: Question) -> tuple[Solved, Gaps]:
     cap = np.asarray(bodies.hardness if bodies.yields else np.inf)
     shape = broadcast_shape(
         **{question.name: question.value, "surface": surface.h_rms},
-        **{name: np.asarray(number) for name, number in bodies.numbers.items()},
+        **numbers,
     )
-    question = Question(question.name, spread(question.value, shape))
+    if np.shape(question.value) != shape:
+        question = Question(question.name, np.broadcast_to(question.value, shape))
     modulus = spread(modulus, shape)
     theory = setup.theory
     if bodies.yields:
@@ -286,7 +290,7 @@ def _of_labelled(setup: Setup, question: Question) -> Contact:
         own = dataclasses.replace(
             setup, surface=block, bodies=bodies.at(*numbers).checked()
         )
-        solved, gaps = _solved(own, question.of_block(given))
+        solved, gaps = _solved(own, question.of_block(given), own.bodies.numbers)
         answer = solved.pressure, solved.area, solved.error
         return (gaps.separation, gaps.mean_separation, *answer)
 
