@@ -4,6 +4,7 @@ import ctypes
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import warnings
@@ -16,6 +17,13 @@ from mbma_tables import Bodies, InputError, contact, contact_law, sensitivity
 from mbma_tables.theories import Mbma
 
 SCALE = int(os.environ.get("MBMA_GAUNTLET", "1"))  # multiplies the counts of random tests
+
+
+def needs(*programs):
+    missing = [program for program in programs if shutil.which(program) is None]
+    return pytest.mark.skipif(
+        bool(missing), reason=f"not installed: {', '.join(missing)}"
+    )
 
 
 NUMBER = re.compile(r"-?\d+\.?\d*(?:e[+-]?\d+)?")

@@ -3,11 +3,10 @@
 import dataclasses
 import functools
 import math
-import shutil
 
 import numpy as np
-import pytest
 from helpers import law_of_names
+from helpers import needs as needs
 
 from mbma_tables import ContactLaw, Surface
 from mbma_tables.export.code.law_code import law_text
@@ -135,10 +134,3 @@ def points(name):
 def text(target, law, **options):
     surface, asked = ASKED[law]
     return law_text(target, surface, "13.3 MPa", **(asked | options))
-
-
-def needs(*programs):
-    missing = [program for program in programs if shutil.which(program) is None]
-    return pytest.mark.skipif(
-        bool(missing), reason=f"not installed: {', '.join(missing)}"
-    )

@@ -22,13 +22,11 @@ from mbma_tables.common.arguments import (
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.interrupts import in_blocks
-from mbma_tables.common.plots import Curve, draw_compression, pressure_label, theory_label
 from mbma_tables.common.shared import frozen
 from mbma_tables.common.units import Units
 from mbma_tables.contacts.law import block as at
 from mbma_tables.contacts.law.block import AREA, FORCE, QUANTITIES, inverse_block
 from mbma_tables.contacts.law.continued import ContinuedLaw
-from mbma_tables.contacts.quantities import registry
 from mbma_tables.contacts.quantities.properties import LawQuantities
 from mbma_tables.contacts.quantities.registry import unit_of
 from mbma_tables.contacts.quantities.stiffnesses import ENERGY_OF_YIELDED
@@ -477,21 +475,18 @@ class ContactLaw(Law, LawQuantities, Displayed):
         }
         return facts | {"size": f"{self.block.nbytes + self.errors.nbytes} bytes"}
 
-    def _variables(self) -> dict[str, Variable]:
+    def _contact_shown(self) -> LawContact:
+        """The contact over the range of the law, of datasets and pictures."""
         ends = min(self.highest, self.h_max), max(self.lowest, -self.h_max)
         light = np.geomspace(*SPACED, SHOWN_POINTS // 2)[:-1]
         deep = np.linspace(SPACED[1], 1.0, SHOWN_POINTS // 2)
         d = np.maximum(
             ends[0] + (ends[1] - ends[0]) * np.concatenate([light, deep]), ends[1]
         )
-        values = {"separation": d, "mean_separation": (d + self.h_max) / 2}
-        values |= self.values(separation=d)._asdict()
-        if self.elastic is not None:
-            del values["energy"]
-        return {
-            name: Variable(value, unit_of(name, self.units), registry.get(name).meaning)
-            for name, value in values.items()
-        }
+        return self.at(separation=d)
+
+    def _variables(self) -> dict[str, Variable]:
+        return self._contact_shown().variables()
 
     def compiled(self, quantity: str = "pressure") -> LowLevelCallable:
         """A quantity as a C function of the separation, ``double (double, void *)``, which scipy calls without Python.
@@ -717,10 +712,4 @@ class ContactLaw(Law, LawQuantities, Displayed):
         return leakage_law(self, self.surface)
 
     def _figure(self) -> Any:
-        held = self._variables()
-        lines = (held[name].values for name in ("mean_separation", "pressure", "area"))
-        pressure = pressure_label(unit_of("pressure", self.units))
-        gap = self.units.length or "length"
-        curve = Curve(theory_label(self.theory), *lines)
-        gap = f"mean separation u [{gap}]"
-        return draw_compression([curve], pressure_label=pressure, gap_label=gap)
+        return self._contact_shown()._figure()

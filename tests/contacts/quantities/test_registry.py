@@ -1,5 +1,6 @@
 """The registry of quantities: what is declared once shows everywhere."""
 
+import csv
 import inspect
 import json
 import types
@@ -8,6 +9,7 @@ import zipfile
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from helpers import compiled_law, needs
 
 from generate.quantities import FILE, properties
 from mbma_tables import (
@@ -30,6 +32,8 @@ from mbma_tables.common.units import (
 )
 from mbma_tables.contacts.quantities import registry
 from mbma_tables.contacts.result import Contact, Setup
+from mbma_tables.design.batch import batch
+from mbma_tables.export.page.explorer import explorer_page
 
 FACE = Surface(hurst=0.8, q0=0.06, q1=3.0, h_rms=1.0, h_max=3.5, unit="um")
 METALS = ("steel 4140 hard", "aluminium 6061 hard")
@@ -62,6 +66,10 @@ def test_a_declared_quantity_shows_in_contacts_laws_joints_datasets_and_commands
     np.testing.assert_allclose(
         law.at(pressure=pressures).thermal_time, seconds, rtol=1e-5
     )
+    data = law.to_dataset()
+    own = LAYER / data["solid_conductance"]
+    np.testing.assert_allclose(data["thermal_time"], own, rtol=1e-14)
+    assert data["thermal_time"].attrs["units"] == "s"
 
     joint = Joint(FACE, bodies=METALS, theory="calibrated")
     np.testing.assert_allclose(
@@ -285,6 +293,32 @@ def test_a_declared_quantity_is_a_function_of_laws_as_code(
         assert b'name="thermal_time"' in archive.read("modelDescription.xml")
 
 
+@needs("gcc")
+def test_a_declared_quantity_runs_in_c(thermal_time, tmp_path):
+    """Its function stood in files of C that no test compiled."""
+    joint = Joint(FACE, bodies=METALS, theory="calibrated")
+    pressed = joint.at(pressure=[f"{p} MPa" for p in (1.0, 10.0, 50.0)])
+    c = 1e-3 * (FACE.h_max - np.asarray(pressed.mean_separation))  # mm
+    source = tmp_path / "road.c"
+    joint.export("c-law", name="road", quantity="thermal_time", path=source)
+    answer = compiled_law(source)("thermal_time", c)
+    np.testing.assert_allclose(answer, pressed.thermal_time, rtol=5e-5)
+
+
+@needs("cc")
+def test_a_declared_quantity_runs_in_an_fmu(thermal_time, tmp_path):
+    fmpy = pytest.importorskip("fmpy")
+    joint = Joint(FACE, bodies=METALS, theory="calibrated")
+    pressed = joint.at(pressure="10 MPa")
+    c = 1e-3 * (FACE.h_max - float(pressed.mean_separation))  # mm
+    path = tmp_path / "road.fmu"
+    asked = {"quantity": "thermal_time", "binaries": "here", "path": path}
+    joint.export("fmu", name="road", **asked)
+    given = {"start_values": {"overclosure": c}, "output": ["thermal_time"]}
+    found = fmpy.simulate_fmu(str(path), stop_time=1.0, **given)[-1]
+    assert list(found)[1] == pytest.approx(float(pressed.thermal_time), rel=5e-5)
+
+
 def test_quantities_without_a_function_are_refused_by_name(thermal_time):
     joint = Joint(FACE, bodies=METALS, theory="calibrated")
     for name, words in {
@@ -459,12 +493,50 @@ def test_a_declared_quantity_has_sensitivities(thermal_time):
 
 
 def test_pictures_have_a_declared_quantity(thermal_time):
-    """Pictures of contacts and joints had lists."""
+    """Pictures of contacts, laws and joints had lists."""
     pressures = np.geomspace(1, 50, 7)
     joint = Joint(FACE, bodies=METALS, theory="calibrated")
     pressed = contact(
         FACE, METALS, pressure=[f"{p} MPa" for p in pressures], theory="calibrated"
     )
-    for figure in (joint.plot(pressures=("1 MPa", "50 MPa")), pressed.plot()):
+    law = contact_law(FACE, METALS, "calibrated")
+    of_joint = joint.plot(pressures=("1 MPa", "50 MPa"))
+    for figure in (of_joint, pressed.plot(), law.plot()):
         labels = [axes.get_ylabel() for axes in figure.axes]
         assert any("time [s]" in label for label in labels), labels
+
+
+def test_the_explorer_has_the_declaration_of_every_quantity(thermal_time):
+    """Unit, meaning and uncertainty of what its page shows have no list of their own."""
+    data = explorer_page(FACE, 57.5, "GPa").split('id="data">')[1].split("</script>")[0]
+    declarations = json.loads(data)["quantities"]
+    assert list(declarations) == list(registry.registry())
+    declared = registry.registry()["thermal_time"]
+    assert declarations["thermal_time"] == {
+        "meaning": declared.meaning,
+        "unit": "s",
+        "uncertainty": "solid_conductance_scatter",
+    }
+
+
+def test_batches_and_ranges_have_a_declared_quantity(thermal_time, tmp_path):
+    designs = tmp_path / "designs.csv"
+    designs.write_text("pressure [MPa]\n10\n50\n")
+    face = {"Rq": "1 um", "hurst": 0.8, "longest": "105 um", "shortest": "2.1 um"}
+    entries = {"nominal_area": "1 cm^2", "theory": "calibrated", "part_a": face}
+    metals = entries | {"bodies": list(METALS)}
+    out = tmp_path / "answers.csv"
+    batch(designs, out, common=metals, quantities=["thermal_time"])
+    with out.open() as file:
+        rows = list(csv.DictReader(file))
+    joint = Joint.from_entries(metals, "joint.toml")
+    own = joint.at(pressure=["10 MPa", "50 MPa"]).thermal_time
+    found = [float(row["thermal_time [s]"]) for row in rows]
+    np.testing.assert_allclose(found, own, rtol=1e-12)
+    bodies = {"E_star": "57 GPa", "hardness": "0.9..1.2 GPa"}
+    bodies["conductivity"] = ["45 W/(m K)", "167 W/(m K)"]
+    ranged = Joint.from_entries(entries | {"bodies": bodies}, "joint.toml")
+    drawn = ranged.uncertainty(["10 MPa"], draws=100)
+    low, median, high = drawn.quantiles["thermal_time"]
+    assert 0 < low < median < high
+    assert drawn.units["thermal_time"] == "s"
