@@ -905,7 +905,7 @@ class Joint(JointQuantities, Displayed):
             return equivalent(surfaces, given.get("nominal_area"))
 
         at_once = all(face.batches for face in faces.values())
-        if at_once and (alone or theory.takes_batches_of_spectra):
+        if at_once:
             return Unknowns(numbers, make, batches=True, one_sided=one_sided)
         # moduli, pressure and hardness are varied with the same surface
         return Unknowns(numbers, functools.cache(make), one_sided=one_sided)

@@ -201,9 +201,7 @@ def _of_drawing(surface: Any, theory: Theory | None, unit: str | None) -> Unknow
     make = functools.partial(
         Surface.from_roughness, unit=unit or surface.unit, process=record.get("process")
     )
-    is_power_law = isinstance(surface, Surface)
-    at_once = is_power_law or theory is None or theory.takes_batches_of_spectra
-    return Unknowns(numbers, make, batches=at_once)
+    return Unknowns(numbers, make, batches=True)
 
 
 def _of_spectrum(surface: MeasuredSurface, theory: Theory | None) -> Unknowns:

@@ -119,21 +119,8 @@ def resolve(
     from mbma_tables.theories.base import Theory
 
     if isinstance(chosen, Theory) and chosen.elastic is chosen:
-        if not chosen.takes_batches_of_spectra:
-            _refuse_batch_of_spectra(chosen, surface)
         return chosen
     return _of_object(chosen, surface)
-
-
-def _refuse_batch_of_spectra(chosen: Theory, surface: Any) -> None:
-    from mbma_tables.surfaces.banded import BandedSurface
-
-    if isinstance(surface, BandedSurface):
-        raise InputError(
-            f"theory {chosen.name!r} takes batches of self-affine surfaces, and surfaces with a roll-off, or "
-            "two parts with different bands, one at a time: theory='calibrated' takes a batch "
-            "of these"
-        )
 
 
 def is_table(theory: Any) -> bool:

@@ -134,7 +134,6 @@ class Theory(abc.ABC):
     looks_of_batch = FEW_LOOKS  # and for each of a batch
     reached = 0.0  # relative amount by which a wanted value may exceed the largest
     bends_in_area = False  # whether at its `bends` only the area is not smooth
-    takes_batches_of_spectra = True  # such as those of parts with a roll-off
     # whether force vanishes at u = h_max; else its Gaussian heights are unbounded
     ends_at_h_max = True
     # whether it goes by the heights of a map, where a surface has them, and not by a spectrum

@@ -171,8 +171,6 @@ def test_what_is_of_one_surface_is_refused():
     one = Surface(hurst=0.8, q0=0.01, q1=[2.0, 3.0], h_rms=0.4, h_max=2.0, unit="um")
     other = Surface(hurst=0.7, q0=0.05, q1=5.0, h_rms=0.5, h_max=2.0, unit="um")
     both = one.combined(other)
-    with pytest.raises(InputError, match=r"'mbma' takes .*one at a time.*'calibrated'"):
-        contact(both, separation=1.0)
     with pytest.raises(InputError, match="take one surface at a time"):
         both.sampled()
     q = np.geomspace(0.02, 3.0, 50)
@@ -191,13 +189,54 @@ def test_other_theories_of_batches_are_as_one_by_one():
     one = Surface(hurst=0.8, q0=0.01, q1=[2.0, 3.0], h_rms=0.4, h_max=2.0, unit="um")
     other = Surface(hurst=0.7, q0=0.05, q1=5.0, h_rms=0.5, h_max=2.0, unit="um")
     both = one.combined(other)
-    for theory in ("persson", "greenwood_williamson"):
+    for theory in ("persson", "greenwood_williamson", "mbma"):
         many = contact(both, "100 GPa", pressure="10 MPa", theory=theory)
         alone = Surface(0.8, 0.01, 3.0, 0.4, 2.0, unit="um").combined(other)
         wanted = contact(alone, "100 GPa", pressure="10 MPa", theory=theory)
         for name in ("area", "mean_separation", "stiffness"):
             found = getattr(many, name)[1]
             assert found == pytest.approx(getattr(wanted, name), rel=1e-5), name
+
+
+def rolled_off(Ra):
+    return Surface.from_roughness(
+        Ra=Ra, hurst=0.8, longest=800.0, shortest=8.0, rolloff=200.0, h_max=8.0, unit="um"
+    )
+
+
+def with_a_gap(h_rms):
+    """No wavelengths between two power laws."""
+    long = Surface(0.8, 0.01, 0.05, h_rms, 9.0, unit="um")
+    return long.combined(Surface(0.7, 0.5, 5.0, 1.0, 3.0, unit="um"))
+
+
+def sampled(batch, k):
+    """One of a batch by the same samples of its spectrum, by the public route."""
+    one = batch.entry((k,))
+    return Surface.from_spectrum(
+        one.q, one.C, h_max=one.h_max, unit="um", convention="paper"
+    )
+
+
+@pytest.mark.parametrize("made", [rolled_off, with_a_gap])
+@pytest.mark.parametrize("bodies", ["100 GPa", Bodies("100 GPa", hardness="2 GPa")])
+def test_islands_of_batches_are_those_of_each_spectrum(made, bodies):
+    """The paper's model takes all it needs of a surface from the spectrum."""
+    batch = made([1.6, 2.0])
+    for asked in (
+        {"separation": [[4.0], [6.0]]},
+        {"pressure": [["10 MPa"], ["20 MPa"]]},
+        {"area": [[0.01], [0.02]]},
+    ):
+        many = contact(batch, bodies, theory="mbma", **asked)
+        name, column = next(iter(asked.items()))
+        for k in range(2):
+            one = {name: [entry for (entry,) in column]}
+            alone = contact(sampled(batch, k), bodies, theory="mbma", **one)
+            for quantity in ("area", "pressure", "stiffness", "mean_separation"):
+                np.testing.assert_allclose(
+                    many.quantity(quantity)[:, k], alone.quantity(quantity), rtol=1e-7
+                )
 
 
 @pytest.mark.parametrize("lazy", [False, True])

@@ -46,6 +46,7 @@ CHECKS = np.array([1e-5, 0.5, 1 - 1e-5])
 POWERS = np.array([5 / 2, 7 / 3, 0, 2])[:, None]
 BLOCK = 1 << 14  # gaps between two checks for interrupts
 
+KEPT = 256  # profiles
 # hurst, zeta_1 and h_max/h_rms of self-affine surfaces, or a measured one
 Shape = tuple[float, float, float] | MeasuredSurface
 # function of approaches and which of them are used: rows of `Panels.fields`, and their error
@@ -515,7 +516,7 @@ def _built(source: Source, fields: Fields, edges: FloatArray, rtol: float) -> Pr
     raise ConvergenceError(message, np.array(True))
 
 
-@shared(64)
+@shared(KEPT)
 def _profile(
     surface: Shape,
     model: AnyModel,

@@ -17,10 +17,13 @@ from numpy.typing import NDArray
 from mbma_tables.common.arguments import FloatArray, grouped, spread
 from mbma_tables.common.errors import ConvergenceError, MbmaError, OutOfRangeError
 from mbma_tables.common.interrupts import in_blocks
+from mbma_tables.common.shared import shared
 from mbma_tables.core import OK, UNRESOLVED, core
 from mbma_tables.islands.island_models import AnyModel, exact_model
 from mbma_tables.islands.variants import Variant
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.banded import BandedSurface
+from mbma_tables.surfaces.spectrum import Band
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.tables.island4d import Island4dModel
 from mbma_tables.tables.universal import UniversalModel
@@ -33,6 +36,7 @@ BLOCK = 256  # pairs between two checks for interrupts
 FEW_SURFACES = 16
 MANY_GAPS = 300
 LEAST = 1e-290  # sums below which the digits that are lost count
+KEPT = 1024  # spectra of batches of sums of power laws
 SUBNORMAL = float(np.finfo(float).smallest_subnormal)
 
 
@@ -117,17 +121,34 @@ def _add_error_of_underflow(rows: FloatArray) -> None:
         error[tiny] = np.minimum(error[tiny] + of_rounding, 1.0)
 
 
+def spectra_of(surface: AnySurface) -> list[MeasuredSurface]:
+    """One surface given by its spectrum, or those of a batch of sums of power laws, in their order."""
+    if isinstance(surface, MeasuredSurface):
+        return [surface]
+    numbers = np.broadcast_arrays(*surface.numbers().values())
+    rows = np.reshape(numbers, (len(numbers), -1)).T.tolist()
+    return [_of_bands(tuple(row)) for row in rows]
+
+
+@shared(KEPT)
+def _of_bands(numbers: tuple[float, ...]) -> MeasuredSurface:
+    """One sum of power laws by samples of its spectrum; the same object for the same numbers, by which its profile is kept."""
+    bands = [Band(*numbers[k : k + 4]) for k in range(1, len(numbers), 4)]
+    return MeasuredSurface.of(BandedSurface(bands, numbers[0]).sampled())
+
+
 def _entries_by_surface(
     surface: AnySurface, shape: tuple[int, ...], places: NDArray[np.intp]
 ) -> tuple[list[Shape], list[tuple[int, NDArray[np.intp]]]]:
     """The surfaces of a batch as arguments of `profile`, and the places of each one's entries."""
-    if isinstance(surface, MeasuredSurface):
-        return [surface], [(0, places)]
-    assert isinstance(surface, Surface)
-    peak = surface.h_max / surface.h_rms
-    numbers = np.array([surface.hurst, surface.zeta_1, peak])
-    rows = numbers.reshape(3, -1).T.tolist()
-    shapes: list[Shape] = [(hurst, zeta_1, height) for hurst, zeta_1, height in rows]
+    shapes: list[Shape]
+    if isinstance(surface, Surface):
+        peak = surface.h_max / surface.h_rms
+        numbers = np.array([surface.hurst, surface.zeta_1, peak])
+        rows = numbers.reshape(3, -1).T.tolist()
+        shapes = [(hurst, zeta_1, height) for hurst, zeta_1, height in rows]
+    else:
+        shapes = [*spectra_of(surface)]
     if len(shapes) == 1:
         return shapes, [(0, places)]
     owner = np.arange(len(shapes)).reshape(surface.shape)

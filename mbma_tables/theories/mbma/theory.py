@@ -21,7 +21,7 @@ from mbma_tables.islands.island_models import (
 )
 from mbma_tables.islands.variants import NAMED, get_variant
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.surface import MeasuredSurface, Surface
+from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.base import (
     EVERYWHERE,
     Compression,
@@ -35,8 +35,14 @@ from mbma_tables.theories.base import (
 from mbma_tables.theories.inversion import Curve
 from mbma_tables.theories.mbma.island import check_band
 from mbma_tables.theories.mbma.models import get_model, with_table
-from mbma_tables.theories.mbma.profile import profile, shape_of
-from mbma_tables.theories.mbma.sums import QUADRATURE_SHARE, Sums, Totals, totals_at
+from mbma_tables.theories.mbma.profile import Shape, profile, shape_of
+from mbma_tables.theories.mbma.sums import (
+    QUADRATURE_SHARE,
+    Sums,
+    Totals,
+    spectra_of,
+    totals_at,
+)
 
 SCAN = 49  # compressions at which force, area and stiffness are searched for a maximum
 # leading powers of h_max - d of force and area
@@ -83,7 +89,6 @@ class Mbma(Theory):
 
     name = "mbma"
     looks_of_batch = 4  # a look costs as much as a step of Newton's method
-    takes_batches_of_spectra = False  # sums of islands are one surface at a time
     advice = "theory='calibrated' for stiffness or separation"
 
     def __post_init__(self) -> None:
@@ -222,17 +227,19 @@ class Mbma(Theory):
         """
         high = np.asarray(surface.h_max, dtype=float)
         lowest = np.zeros(surface.shape)
-        if isinstance(surface, MeasuredSurface):
-            # islands up to an approach of 2 h_max make u = 0
-            rtol = QUADRATURE_SHARE * self.rtol
-            of_surface = profile(
-                surface, self.sums.model, self.variant, rtol, self.outside
-            )
-            end = float(of_surface.edges[-1]) / (2 * of_surface.source.peak)
-            lowest = np.asarray(surface.h_max * (1 - end))
-        else:
+        if isinstance(surface, Surface):
             check_band(surface, self.variant)
+        else:
+            # islands up to an approach of 2 h_max make u = 0
+            ends = [self._end(shape) for shape in spectra_of(surface)]
+            lowest = high * (1 - np.reshape(ends, surface.shape))
         return self._maximum(surface, quantity, lowest), high
+
+    def _end(self, surface: Shape) -> float:
+        """Where the islands of a spectrum end, over twice the highest point."""
+        rtol = QUADRATURE_SHARE * self.rtol
+        of_surface = profile(surface, self.sums.model, self.variant, rtol, self.outside)
+        return float(of_surface.edges[-1]) / (2 * of_surface.source.peak)
 
     def branch(
         self, surface: AnySurface, quantity: str, wanted: FloatArray
