@@ -90,6 +90,12 @@ class Setup:
         hardness = checked_hardness(bodies.hardness)
         return with_hardness(self.theory, hardness, bodies.E_star, bodies.largest)
 
+    @functools.cached_property
+    def whole_theory(self) -> Theory:
+        """The theory of all entries, which keeps what it found of the surface."""
+        numbers = map(np.asarray, self.bodies.numbers.values())
+        return self.theory_of(self.bodies.at(*numbers))
+
 
 class Contact(State, Displayed):
     """A contact: its pressure and area, and every other quantity of the registry, by its name.
@@ -268,8 +274,10 @@ class Contact(State, Displayed):
             )
             return labelled
         broadcast_shape(surface=self.surface.h_rms, **arrays)
-        plain = map(np.asarray, arrays.values())
-        return tuple(part[()] for part in block(self.surface, *plain))
+        gap, *others = map(np.asarray, arrays.values())
+        theory = self._setup.whole_theory
+        found = function(theory, self.surface, gap, others[0], *others[count:])
+        return tuple(part[()] for part in found)
 
     @property
     def answer(self) -> TheoryAnswer:
@@ -335,6 +343,10 @@ class Contact(State, Displayed):
 
     def unloading(self) -> Contact:
         """The contact as it unloads from here, with its own pressure as the largest so far if it is."""
+        return self._unloading
+
+    @functools.cached_property
+    def _unloading(self) -> Contact:
         if not self.yields:
             return self
         largest = self.pressure

@@ -19,7 +19,7 @@ from mbma_tables.surfaces.banded import BandedSurface
 from mbma_tables.surfaces.spectral import PRESSED
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.theories import tested
-from mbma_tables.theories.base import Theory, TheoryAnswer, unfinished
+from mbma_tables.theories.base import Theory, TheoryAnswer, select, unfinished
 from mbma_tables.theories.calibrated import table as calibrated_table
 from mbma_tables.theories.calibrated.formulas import (
     KEPT,
@@ -59,6 +59,11 @@ WIDE_SCATTER = {"area": 0.01, "pressure": 0.05, "stiffness": 0.08}
 LIKE_SCANS = 1e-3, 0.9  # A/A0 at which scans are compared
 MANY = 1000  # entries for which polynomials of one surface are made
 ROUNDING = 1e-14  # rounding of a separation beside h_max
+# nodes of the rule for energies, whose error is below 6e-9 where h_max/h_rms is at most the
+# first of these numbers and u/h_max at least the second; there the table errs by more
+NODES = 48
+RULE_COVERS = 10.0, 1e-6
+TOGETHER = 2**17  # forces in memory at once
 
 
 def _own_law(surface: MeasuredSurface) -> OwnLaw:
@@ -329,6 +334,45 @@ class Calibrated(Theory):
             surface.alpha,
             calibrated_table.shipped().constants,
         )
+
+    def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
+        """Elastic energy over A0 E* [length], by a rule of a fixed number of forces but for high or closed surfaces."""
+        if isinstance(surface, MeasuredSurface):
+            return super().energy(surface, mean_separation)
+        u = np.asarray(mean_separation, float)
+        h_max = np.asarray(surface.h_max)
+        found = self._energy_by_rule(surface, np.minimum(u, h_max))
+        highest, closest = RULE_COVERS
+        is_high = h_max > highest * np.asarray(surface.h_rms)
+        rest = np.flatnonzero(
+            np.broadcast_to(is_high | (u < closest * h_max), found.shape)
+        )
+        if rest.size:
+            others = select(surface, found.shape, rest)
+            gaps = np.broadcast_to(u, found.shape).ravel()[rest]
+            found.ravel()[rest] = super().energy(others, gaps)
+        return found
+
+    def _energy_by_rule(self, surface: AnySurface, u: FloatArray) -> FloatArray:
+        # towards full contact force is smooth over the root of u, and beside h_max, where it
+        # is a power of what is left, over the root of that
+        nodes, weights = np.polynomial.legendre.leggauss(NODES)
+        last = np.sqrt(np.sqrt(surface.h_max))
+        width = last - np.sqrt(np.sqrt(u))
+        batch = _bound(surface, u)
+        energy = np.zeros(width.shape)
+        step = max(1, TOGETHER // max(width.size, 1))
+        for start in range(0, NODES, step):
+            some = slice(start, start + step)
+            place = 0.5 * (1 + nodes[some].reshape(-1, *[1] * width.ndim))
+            root = last - width * place**2
+            force = batch.contact(np.minimum(root**4, surface.h_max))[0]
+            # one after the other, so that sums do not depend on how many there are
+            for weight, one in zip(
+                weights[some], force * 4 * root**3 * place, strict=True
+            ):
+                energy += weight * one
+        return energy * width
 
     def heights(self, surface: AnySurface) -> Any:
         """Heights of a map, or Gaussian."""

@@ -467,7 +467,9 @@ class Unloading(Theory):
     ) -> tuple[FloatArray, Any]:
         """Mean separations u at forces over A0 E*, and those of the elastic contact."""
         peak = self.peak(surface)
-        heavy = (pressure >= peak.pressure) | ~peak.remembered
+        # at the largest pressure both branches meet
+        other = pressure != peak.pressure
+        heavy = other & ((pressure > peak.pressure) | ~peak.remembered)
         v = self.branch_theory.mean_separation_at(surface, "pressure", pressure)
         s = np.minimum(pressure / peak.pressure, 1.0)
         tail = self.tail(surface)

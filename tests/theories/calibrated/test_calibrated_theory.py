@@ -32,6 +32,7 @@ from mbma_tables.surfaces.bearing_curve import QUANTILES
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import Calibrated, Mbma, Persson, resolve
+from mbma_tables.theories.base import Theory
 from mbma_tables.theories.calibrated.formulas import (
     CONSTANTS,
     Law,
@@ -40,6 +41,7 @@ from mbma_tables.theories.calibrated.formulas import (
 )
 from mbma_tables.theories.calibrated.map_curves import MAP_CONSTANTS, hertz_ellipse
 from mbma_tables.theories.calibrated.table import load, shipped
+from mbma_tables.theories.calibrated.theory import Batch
 from mbma_tables.theories.evidence import NAME, QUANTITIES, shipped_deviations
 
 DATA = pathlib.Path(__file__).parents[3] / "docs" / "data"
@@ -451,6 +453,32 @@ def test_errors_hold_next_to_last_contact(hurst, zeta_1, top):
     stiffness = law.contact((top - depth * root**2).ravel())[2].reshape(u.size, -1)
     exact = surface.rms_gradient * (stiffness * depth * root) @ weights
     assert (np.abs(found.pressure / exact - 1) <= found.error).all()
+
+
+@pytest.mark.parametrize("top", [3.0, 6.5, 8.2])
+def test_energies_take_few_forces(top, monkeypatch):
+    """Against the tanh-sinh quadrature that theories have by default, within the table and beyond it."""
+    rng = np.random.default_rng(5)
+    surfaces = Surface(
+        rng.uniform(0.3, 0.99, 12), 1.0, 10 ** rng.uniform(0.8, 3, 12), 1.0, top
+    )
+    shares = np.array([1e-9, 1e-6, 1e-4, 1e-2, 0.03, 0.1, 0.3, 0.6, 0.9, 0.99])
+    u = np.repeat(top * shares[:, None], 12, axis=1)
+    forces = []
+    of_batch = Batch.contact
+
+    def counted(batch, gaps):
+        forces.append(np.broadcast(gaps, batch.h_rms.reshape(batch.shape)).size)
+        return of_batch(batch, gaps)
+
+    expected = Theory.energy(THEORY, surfaces, u)
+    monkeypatch.setattr(Batch, "contact", counted)
+    np.testing.assert_allclose(THEORY.energy(surfaces, u), expected, rtol=6e-9)
+    forces.clear()
+    found = THEORY.energy(surfaces, u[1:])
+    assert sum(forces) <= 50 * found.size
+    # sums do not depend on the other entries
+    np.testing.assert_array_equal(THEORY.energy(surfaces, u[4]), found[3])
 
 
 def test_full_contact_holds_all_energy():

@@ -23,6 +23,7 @@ from mbma_tables.surfaces.bearing_curve import bearing
 from mbma_tables.theories import THEORIES, Simulated
 from mbma_tables.theories.simulated.boundary_elements import Contact
 from mbma_tables.theories.yielding import unloading as law
+from mbma_tables.theories.yielding.theory import Yielding
 
 FACE = Surface(hurst=0.8, q0=0.06, q1=2.0, h_rms=1.0, h_max=3.5, unit="um")
 BODIES = Bodies("100 GPa", hardness="5 GPa", conductivity="45 W/(m K)", nu=0.3)
@@ -46,6 +47,22 @@ def test_the_branch_meets_first_loading_at_the_largest_pressure(theory):
     near = unloaded("99.9999 MPa", theory)
     for name in (*names, "unloading_stiffness"):
         assert near.quantity(name) == pytest.approx(first.quantity(name), rel=2e-4)
+
+
+def test_the_largest_pressure_is_solved_for_once(monkeypatch):
+    """For the contact, and for the branch from there, of which energy and slip are quantities."""
+    solved = []
+    at_force = Yielding.at_force
+
+    def counted(theory, surface, pressure):
+        solved.append(pressure)
+        return at_force(theory, surface, pressure)
+
+    monkeypatch.setattr(Yielding, "at_force", counted)
+    pressed = contact(FACE, BODIES, pressure="50 MPa", theory="calibrated")
+    assert pressed.energy > 0
+    assert pressed.tangential(friction=0.2).gross_slip > 0
+    assert len(solved) == 2
 
 
 @each
