@@ -372,7 +372,7 @@ class Calibrated(Theory):
                 weights[some], force * 4 * root**3 * place, strict=True
             ):
                 energy += weight * one
-        return energy * width
+        return np.asarray(energy * width)
 
     def heights(self, surface: AnySurface) -> Any:
         """Heights of a map, or Gaussian."""
