@@ -14,7 +14,7 @@ from mbma_tables.common.units import Units, factor, in_one_unit, known
 from mbma_tables.surfaces import bearing_curve as bearing
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.measurements import grid_of, read_measurement
-from mbma_tables.surfaces.profiles import measured_profile
+from mbma_tables.surfaces.profiles import measured_profiles
 from mbma_tables.surfaces.psd import SCATTER, Bins, log_bins
 from mbma_tables.surfaces.spectral import NO_MAP, SpectralSurface
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1, PowerLaws
@@ -388,14 +388,55 @@ def _unsampled(steeper: float) -> dict[str, Any]:
     return {"step": "corners", "rms_gradient": steeper, "told": description}
 
 
+def measured_traces(
+    heights: Any,
+    across: Any,
+    options: Mapping[str, Any],
+    isotropic: bool,
+    shortest: Any = None,
+    hurst: Any = None,
+) -> SpectralSurface:
+    """The surface of line scans, extrapolated if requested; see `Surface.from_profile`."""
+    if across is not None and isotropic:
+        raise InputError(
+            "isotropic=True is of traces in one direction: traces across measure the lay"
+        )
+    lists = [_several(heights), [] if across is None else _several(across)]
+    traces, crossing = ([prepared(each, options, 1) for each in some] for some in lists)
+    units = dict.fromkeys(trace.unit for trace in (*traces, *crossing))
+    if None in units and len(units) > 1:
+        raise InputError(
+            "some traces have a unit and some do not: give unit=..., to which those of "
+            "files are converted"
+        )
+    if len(units) > 1:
+        same = {**options, "unit": traces[0].unit}
+        traces, crossing = ([prepared(each, same, 1) for each in some] for some in lists)
+    surface = measured_profiles(traces, crossing, isotropic).resolved()
+    _require_both(shortest, hurst)
+    return surface if shortest is None else extrapolated(surface, shortest, hurst)
+
+
+def _several(traces: Any) -> list[Any]:
+    """The traces of a list of them, or the only one."""
+    if not isinstance(traces, list | tuple) or not traces:
+        return [traces]
+    is_number = np.isscalar(traces[0]) and not isinstance(traces[0], str)
+    return [traces] if is_number or traces[0] is None else list(traces)
+
+
+def _require_both(shortest: Any, hurst: Any) -> None:
+    if (shortest is None) != (hurst is None):
+        raise InputError("extrapolate_to and extrapolate_hurst: give both or neither")
+
+
 def measured_surface(
     treated: Treated, h_max: float | None = None, shortest: Any = None, hurst: Any = None
 ) -> SpectralSurface:
     """The surface of a treated map or line scan, extrapolated if requested."""
-    if (shortest is None) != (hurst is None):
-        raise InputError("extrapolate_to and extrapolate_hurst: give both or neither")
+    _require_both(shortest, hurst)
     is_trace = treated.heights.ndim == 1
-    surface = measured_profile(treated) if is_trace else measured_map(treated)
+    surface = measured_profiles([treated]) if is_trace else measured_map(treated)
     if h_max is not None:
         surface = dataclasses.replace(surface, h_max=h_max)
     surface = surface.resolved()
@@ -459,9 +500,9 @@ def extrapolated(surface: S, shortest: Any, hurst: Any) -> S:
         samples = np.append(samples, np.full(q.size, samples[-1]))
     C = np.append(surface.C, np.exp(level - slope * np.log(q)))
     # the curves of the map do not include the added wavelengths
-    longer = dataclasses.replace(
-        surface, **NO_MAP, q=np.append(surface.q, q), C=C, samples=samples
-    )
+    scans = tuple(extrapolated(scan, shortest, hurst) for scan in surface.scans)
+    changed = {**NO_MAP, "scans": scans, "C": C, "samples": samples}
+    longer = dataclasses.replace(surface, **changed, q=np.append(surface.q, q))
     area = float(surface.rms_gradient / longer.rms_gradient)
     stiffness = float(surface.h_rms / longer.h_rms)
     description = (

@@ -9,6 +9,7 @@ of the measurement allows, with the profile's variance of height and gradient.
 import dataclasses
 import itertools
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,9 @@ from numpy.typing import NDArray
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.heights import Heights
-from mbma_tables.surfaces.spectral import SpectralSurface
+from mbma_tables.surfaces.spectral import BY_SPECTRUM, SpectralSurface
 from mbma_tables.surfaces.spectrum import PowerLaws
-from mbma_tables.surfaces.treatment import MIN_POWER, Treated
+from mbma_tables.surfaces.treatment import MIN_POWER, Provenance, Treated
 
 PER_DECADE = 10  # nodes of the spectrum
 PANELS = 8  # panels between two nodes
@@ -31,105 +32,282 @@ ROLLED_OFF = (
 )
 MIN_NODES = 5
 ONE_TRACE = (
-    "one trace cannot tell lay, heights and gradient of a surface as well as the stated "
-    "scatter: measure a map, Surface.from_map(map)"
+    "traces cannot tell heights and gradient of a surface as well as the stated scatter: "
+    "measure a map, Surface.from_map(map)"
+)
+REPLICAS = 20  # whose standard deviation is known to 16%
+MIN_WAVES = 40.0  # longest wavelengths that the traces hold together
+ISOTROPIC = "the surface is isotropic: traces in one direction do not show a lay"
+ONE_DIRECTION = (
+    "isotropy is assumed, and traces in one direction do not show a lay: "
+    "Surface.from_profile(..., across=[...]) takes traces at right angles, "
+    "isotropic=True states that there is no lay"
 )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class _Trace:
-    """The Fourier components of a line scan, by bins; lengths are over its highest point."""
+class _Traces:
+    """Fourier components of line scans, by bins; lengths are over their highest point."""
 
     q: FloatArray
     C: FloatArray  # C_1D of each component
-    slopes: FloatArray  # C_1D q^2
+    width: FloatArray  # dq of each in the mean spectrum of all traces and directions
+    overlap: FloatArray  # components that count as one independent component
     edges: FloatArray  # wavenumbers between bins
     bin_of: NDArray[np.intp]  # of each component
-    count: FloatArray  # components in each bin
-    overlap: float  # components that count as one independent component
     h_rms: float
-    gradient: float
+
+    @property
+    def slopes(self) -> FloatArray:
+        """C_1D q^2 of each component."""
+        return self.C * self.q**2
+
+    @property
+    def gradient(self) -> float:
+        """Root mean square gradient of the isotropic surface."""
+        return math.sqrt(2 * float(self.slopes @ self.width) / math.pi)
 
     @property
     def independent(self) -> FloatArray:
         """Independent components in each bin."""
-        return self.count / self.overlap
+        return self.sums(1.0) ** 2 / self.sums(self.overlap * self.width)
+
+    def sums(self, values: Any) -> FloatArray:
+        """Sums of values times dq over each bin."""
+        return np.asarray(np.bincount(self.bin_of, values * self.width), float)
+
+    def resampled(self, rng: np.random.Generator) -> tuple[FloatArray, float, float]:
+        """Mean C_1D of bins, h_rms and gradient of other traces of a Gaussian surface."""
+        by = rng.gamma(self.independent) / self.independent
+        powers = self.sums(self.C)
+        slopes = self.sums(self.slopes)
+        # heights are not under the window, whose components are correlated
+        change = float(powers @ (by - 1) / powers.sum())
+        square = 1 + max(change / math.sqrt(float(self.overlap.max())), -0.9)
+        gradient = self.gradient * math.sqrt(float(slopes @ by / slopes.sum()))
+        mean = powers / self.sums(1.0)
+        return mean * by, self.h_rms * math.sqrt(square), gradient
 
 
-def measured_profile(treated: Treated) -> SpectralSurface:
-    """The isotropic surface of a treated line scan; see `Surface.from_profile`."""
+def measured_profiles(
+    traces: Sequence[Treated], across: Sequence[Treated] = (), isotropic: bool = False
+) -> SpectralSurface:
+    """The isotropic surface of treated line scans; see `Surface.from_profile`."""
+    every = [*traces, *across]
     # lengths of order one, so that their powers neither underflow nor overflow
-    scale = float(np.abs(treated.heights).max())
-    step = treated.steps[0] / scale
-    low, high = (scale * wave for wave in treated.waves)
-    # oblique wavelengths appear longer along the line: the cut-off applies to the spectrum,
-    # not to the trace
-    uncut = treated.heights if treated.uncut is None else treated.uncut
-    whole = dataclasses.replace(treated, heights=uncut / scale)
-    heights = Heights.of(treated.heights / scale)
-    length = treated.heights.size * step
+    scale = max(float(np.abs(trace.heights).max()) for trace in every)
+    low, high = (scale * wave for wave in traces[0].waves)
+    directions = [_pooled(each, scale, low) for each in (traces, across) if each]
+    pooled = directions[0] if len(directions) == 1 else _joined(directions)
+    heights = _heights(every, scale)
+    length = sum(map(_length, every)) / scale
 
-    trace = _trace_of(whole, step, length, low)
-    nodes = _spectrum_at_nodes(trace)
-    waves = length * trace.gradient / trace.h_rms
-    notes = [_accuracy(trace, high), _limits(waves)]
-    longest = float(trace.C[:LONGEST].sum() / trace.C.sum())
+    kernel = _kernel(pooled)
+    mean = pooled.sums(pooled.C) / pooled.sums(1.0)
+    nodes = _spectrum_at_nodes(pooled, kernel, (mean, pooled.h_rms, pooled.gradient))
+    notes = [_accuracy(pooled, high), _limits(length * pooled.gradient / pooled.h_rms)]
+    notes += _directions(directions, isotropic)
+    notes += _of_slopes(every)
+    longest = _share_of_longest(pooled, len(every))
     if longest > ROLLED_OFF:
         # the distribution needs more than a few wavelengths
-        heights = Heights.gaussian(trace.h_rms, heights.h_max)
+        heights = Heights.gaussian(pooled.h_rms, heights.h_max)
         notes.append(_without_roll_off(longest))
 
-    end = min(high, float(trace.edges[-1]))
-    q = np.append(trace.edges[trace.edges < end], end)
-    C = PowerLaws(trace.edges, nodes).at(q)
-    samples = np.interp(np.log(q), np.log(trace.edges[:-1]), trace.independent)
-    surface = SpectralSurface(q, C, heights=heights, samples=samples)
-    surface = surface.scaled(scale, treated.unit)
-    return dataclasses.replace(surface, provenance=treated.history(*notes))
+    end = min(high, float(pooled.edges[-1]))
+    q = np.append(pooled.edges[pooled.edges < end], end)
+    samples = np.interp(np.log(q), np.log(pooled.edges[:-1]), pooled.independent)
+    anisotropy = _anisotropy(directions)
+
+    def surface_of(C_of_nodes: FloatArray, heights: Heights) -> SpectralSurface:
+        return SpectralSurface(
+            q,
+            PowerLaws(pooled.edges, C_of_nodes).at(q),
+            heights=heights,
+            samples=samples,
+            anisotropy=anisotropy,
+        )
+
+    surface = surface_of(nodes, heights)
+    rng = np.random.default_rng(0)
+    replicas = []
+    for _ in range(REPLICAS):
+        resampled = pooled.resampled(rng)
+        size = resampled[1] / pooled.h_rms
+        resampled_nodes = _spectrum_at_nodes(pooled, kernel, resampled, nodes)
+        replicas.append(surface_of(resampled_nodes, heights.scaled(size)))
+    notes += _few_waves(surface, length)
+    surface = dataclasses.replace(surface, scans=tuple(replicas))
+    surface = surface.scaled(scale, traces[0].unit)
+    return dataclasses.replace(surface, provenance=_history(every, notes))
 
 
-def _trace_of(whole: Treated, step: float, length: float, low: float) -> _Trace:
-    """The components of a trace of that step and length, from a wavenumber on."""
-    unit = 2 * math.pi / length
-    q, C = _components(whole, step, low)
+def _length(trace: Treated) -> float:
+    return float(trace.heights.size * trace.steps[0])
+
+
+def _heights(traces: Sequence[Treated], scale: float) -> Heights:
+    """The distribution of heights of all traces, each by its length."""
+    step = max(trace.steps[0] for trace in traces)
+    values = []
+    for trace in traces:
+        count = round(_length(trace) / step)
+        place = np.linspace(0, trace.heights.size - 1, count).round().astype(int)
+        values.append(trace.heights[place] / scale)
+    heights = Heights.of(np.concatenate(values))
+    highest = max(float(trace.heights.max()) for trace in traces) / scale
+    return dataclasses.replace(heights, h_max=highest)
+
+
+def _pooled(traces: Sequence[Treated], scale: float, low: float) -> _Traces:
+    """The components of parallel traces from a wavenumber on; each counts by its length."""
+    whole_length = sum(map(_length, traces)) / scale
+    components = []
+    square = 0.0
+    for trace in traces:
+        # oblique wavelengths appear longer along the line: the cut-off applies to the
+        # spectrum, not to the trace
+        uncut = trace.heights if trace.uncut is None else trace.uncut
+        whole = dataclasses.replace(trace, heights=uncut / scale)
+        q, C = _components(whole, trace.steps[0] / scale, low)
+        components.append((q, C, np.full(q.size, trace.overlap)))
+        share = _length(trace) / scale / whole_length
+        square += share * float(whole.heights.var())
+    q, C, overlap = (np.concatenate(each) for each in zip(*components, strict=True))
+    width = np.full(q.size, 2 * math.pi / whole_length)
+    first = 2 * math.pi * scale / max(map(_length, traces))
+    return _binned(q, C, width, overlap, math.sqrt(square), first)
+
+
+def _joined(directions: Sequence[_Traces]) -> _Traces:
+    """The components of traces in two directions, of which each counts half."""
+    fields = [[each.q, each.C, each.width / 2, each.overlap] for each in directions]
+    q, C, width, overlap = (np.concatenate(each) for each in zip(*fields, strict=True))
+    h_rms = math.sqrt(sum(each.h_rms**2 for each in directions) / 2)
+    first = min(2 * float(each.q[0] - each.edges[0]) for each in directions)
+    return _binned(q, C, width, overlap, h_rms, first)
+
+
+def _binned(
+    q: FloatArray,
+    C: FloatArray,
+    width: FloatArray,
+    overlap: FloatArray,
+    h_rms: float,
+    unit: float,
+) -> _Traces:
+    rising = np.argsort(q, kind="stable")
+    q, C, width, overlap = (each[rising] for each in (q, C, width, overlap))
     edges, bin_of = _bins(q, unit)
-    slopes = C * q**2
-    return _Trace(
-        q=q,
-        C=C,
-        slopes=slopes,
-        edges=edges,
-        bin_of=bin_of,
-        count=np.bincount(bin_of).astype(float),
-        overlap=whole.overlap,
-        h_rms=float(whole.heights.std()),
-        gradient=math.sqrt(2 * slopes.sum() * unit / np.pi),
-    )
+    return _Traces(q, C, width, overlap, edges, bin_of, h_rms)
 
 
-def _spectrum_at_nodes(trace: _Trace) -> FloatArray:
-    """C of the isotropic surface at the edges of bins."""
-    edges = trace.edges
-    # panels between nodes, evenly spaced in ln q
+def _fine(edges: FloatArray) -> FloatArray:
+    """Ends of panels between nodes, evenly spaced in ln q."""
     place = np.arange(PANELS * (edges.size - 1) + 1) / PANELS
-    fine = np.exp(np.interp(place, np.arange(edges.size), np.log(edges)))
-    starts = np.searchsorted(trace.bin_of, np.arange(trace.count.size))
-    kernel = _panel_sums(fine, trace.q, starts)
-    mean = np.bincount(trace.bin_of, trace.C) / trace.count
-    squares = (trace.h_rms**2, trace.gradient**2)
-    return _isotropic(
-        edges, fine, mean, trace.independent, kernel / trace.count[:, None], squares
+    return np.exp(np.interp(place, np.arange(edges.size), np.log(edges)))
+
+
+def _kernel(traces: _Traces) -> FloatArray:
+    """Mean C_1D of each bin for C = 1 on each panel."""
+    bins = np.arange(traces.edges.size - 1)
+    starts = np.searchsorted(traces.bin_of, bins)
+    sums = _panel_sums(_fine(traces.edges), traces.q, traces.width, starts)
+    return sums / traces.sums(1.0)[:, None]
+
+
+def _spectrum_at_nodes(
+    traces: _Traces,
+    kernel: FloatArray,
+    measured: tuple[FloatArray, float, float],
+    near: FloatArray | None = None,
+) -> FloatArray:
+    """C of the isotropic surface at the edges of bins.
+
+    `measured` are the mean C_1D of bins, h_rms and gradient; `near` is a C to start from.
+    """
+    mean, h_rms, gradient = measured
+    edges = traces.edges
+    squares = (h_rms**2, gradient**2)
+    fine = _fine(edges)
+    return _isotropic(edges, fine, mean, traces.independent, kernel, squares, near)
+
+
+def _history(traces: Sequence[Treated], notes: Sequence[dict[str, Any]]) -> Provenance:
+    """All steps: reading and treatment of the first trace, the other traces, and notes."""
+    if len(traces) == 1:
+        return traces[0].history(*notes)
+    others = {
+        "step": "traces",
+        "of": [list(trace.history()) for trace in traces[1:]],
+        "told": f"mean of {len(traces)} traces, each by its length",
+    }
+    return traces[0].history(others, *notes)
+
+
+def _directions(directions: Sequence[_Traces], isotropic: bool) -> list[dict[str, Any]]:
+    """Note on what is known of the lay."""
+    if len(directions) > 1:
+        ratio = _anisotropy(directions)
+        description = f"gradients along and across differ by a factor of {ratio:.3g}"
+        return [{"step": "directions", "anisotropy": ratio, "told": description}]
+    if isotropic:
+        return [{"step": "directions", "assumed": [ISOTROPIC]}]
+    return [{"step": "directions", "not_valid": ONE_DIRECTION}]
+
+
+def _anisotropy(directions: Sequence[_Traces]) -> float | None:
+    """Root of the ratio of mean squared slopes in two directions; None of one direction."""
+    if len(directions) == 1:
+        return None
+    one, other = (each.gradient for each in directions)
+    return max(one, other) / min(one, other)
+
+
+def _of_slopes(traces: Sequence[Treated]) -> list[dict[str, Any]]:
+    """Note on slopes unlike those of Gaussian surfaces."""
+    slopes = np.concatenate([np.diff(each.heights) / each.steps[0] for each in traces])
+    slopes = slopes - slopes.mean()
+    kurtosis = float(np.mean(slopes**4) / np.mean(slopes**2) ** 2)
+    low, high = BY_SPECTRUM["kurtosis of slopes"]
+    if low <= kurtosis <= high:
+        return []
+    why = (
+        f"the kurtosis of slopes along the line is {kurtosis:.3g}, tested from {low:g} to "
+        f"{high:g}: measure a map, Surface.from_map(map)"
     )
+    return [{"step": "slopes", "kurtosis": kurtosis, "not_valid": why}]
 
 
-def _accuracy(trace: _Trace, high: float) -> dict[str, Any]:
+def _few_waves(surface: SpectralSurface, length: float) -> list[dict[str, Any]]:
+    """Note on traces that hold few of the longest wavelengths."""
+    waves = length * surface.longest / (2 * math.pi)
+    if waves >= MIN_WAVES:
+        return []
+    why = (
+        f"the traces hold {waves:.3g} of the longest wavelengths, fewer than "
+        f"{MIN_WAVES:g}: measure a longer trace, or several: "
+        "Surface.from_profile([trace, trace, ...])"
+    )
+    return [{"step": "few wavelengths", "waves": waves, "not_valid": why}]
+
+
+def _share_of_longest(traces: _Traces, count: int) -> float:
+    """Share of the variance in the longest wavelengths of `count` traces."""
+    longest = slice(LONGEST * count)
+    powers = traces.C * traces.width
+    return float(powers[longest].sum() / powers.sum())
+
+
+def _accuracy(traces: _Traces, high: float) -> dict[str, Any]:
     """Note on the standard errors of h_rms and gradient."""
     # powers are exponentially distributed: the mean of squares is twice the square of the
     # mean
-    is_measured = trace.q <= high * (1 + 1e-9)
-    of_height = _relative_error(trace.C[is_measured])
-    of_slope = _relative_error(trace.slopes[is_measured])
-    of_gradient = math.sqrt(trace.overlap) * of_slope
+    is_measured = traces.q <= high * (1 + 1e-9)
+    powers = (traces.C * traces.width)[is_measured]
+    slopes = (traces.slopes * traces.width)[is_measured]
+    of_height = _relative_error(powers)
+    of_gradient = math.sqrt(float(traces.overlap.max())) * _relative_error(slopes)
     description = (
         f"h_rms is known to {of_height:.1%} and the rms gradient to {of_gradient:.1%} "
         "(one standard error, of a Gaussian surface)"
@@ -155,11 +333,14 @@ def _without_roll_off(share: float) -> dict[str, Any]:
         "variance: h_rms grows with its length, its error is larger than stated, and "
         "heights are taken as Gaussian"
     )
-    return {"step": "no roll-off", "share": share, "told": description}
+    why = f"{description}: measure longer traces, or give a long_cutoff"
+    return {"step": "no roll-off", "share": share, "told": description, "not_valid": why}
 
 
-def _panel_sums(fine: FloatArray, q: FloatArray, starts: NDArray[np.intp]) -> FloatArray:
-    """C_1D for C = 1 on each panel, summed over the wavenumbers of each bin.
+def _panel_sums(
+    fine: FloatArray, q: FloatArray, width: FloatArray, starts: NDArray[np.intp]
+) -> FloatArray:
+    """C_1D times dq for C = 1 on each panel, summed over the wavenumbers of each bin.
 
     Bins begin at `starts`.
     """
@@ -170,10 +351,11 @@ def _panel_sums(fine: FloatArray, q: FloatArray, starts: NDArray[np.intp]) -> Fl
         lowest = max(int(np.searchsorted(fine, q[start])) - 1, 0)
         squared_ends = fine[lowest:] ** 2
         for first in range(start, stop, BLOCK):
-            block = q[first : min(first + BLOCK, stop), None]
+            part = slice(first, min(first + BLOCK, stop))
+            block = q[part, None]
             # the integral of q' dq'/sqrt(q'^2 - q^2)
             roots = np.sqrt(np.maximum(squared_ends - block**2, 0))
-            sums[bin_, lowest:] += np.diff(4 * np.pi * roots, axis=1).sum(axis=0)
+            sums[bin_, lowest:] += width[part] @ np.diff(4 * np.pi * roots, axis=1)
     return sums
 
 
@@ -215,6 +397,7 @@ def _isotropic(
     count: FloatArray,
     kernel: FloatArray,
     squares: tuple[float, float],
+    near: FloatArray | None,
 ) -> FloatArray:
     """C at the edges of bins [length^4], h_rms^2 = 2 pi integral C q dq.
 
@@ -257,6 +440,8 @@ def _isotropic(
     middles = np.sqrt(edges[1:] * edges[:-1])[has_power]
     log_start = np.log(mean[has_power] / (2 * np.pi * middles))
     start = np.interp(log_q, np.log(middles), log_start)
+    if near is not None:
+        start = np.log(near)
     fitted = least_squares(deviations, start, jac=jacobian)
     return np.asarray(np.exp(fitted.x))
 
@@ -285,8 +470,8 @@ def _limits(waves: float) -> dict[str, Any]:
     level = math.sqrt(2 * math.log(max(summits, 2.0)))
     level = math.sqrt(2 * math.log(max(level * summits, 2.0)))
     description = (
-        "one trace cannot tell anisotropy: across a lay the gradient is up to sqrt(2) "
-        "times too large, along it too small. Its highest point is a line's: a Gaussian "
+        "one direction cannot tell anisotropy: across a lay the gradient is up to sqrt(2) "
+        "times too large, along it too small. The highest point is a line's: a Gaussian "
         f"square of its length reaches about {level:.1f} h_rms"
     )
     return {"step": "unseen", "h_max": level, "told": description, "not_valid": ONE_TRACE}

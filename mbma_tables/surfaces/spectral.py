@@ -97,7 +97,9 @@ class SpectralSurface(AnySurface):
     table : MapSimulation, optional
         What boundary elements found of them already (`mbma_tables.theories.simulated.pressing`).
     scans : tuple of MeasuredSurface, optional
-        Several, of which it is the average (`mbma_tables.surfaces.averages`).
+        Several, of which it is the average (`mbma_tables.surfaces.averages`), or, of
+        traces, surfaces that differ by their sampling error. What laws of them differ by
+        adds to the scatter.
     samples : array_like, shape (n,), optional
         Independent samples behind each entry of C, as weights of a fit.
     anisotropy : float, optional
@@ -294,8 +296,7 @@ class SpectralSurface(AnySurface):
         if self.anisotropy is not None:
             statistics["anisotropy"] = self.anisotropy
         remedy = "beyond, only 'calibrated' by a map was tested"
-        if self.scans:
-            call = self.scans[0].simulating("surface.scans[0]")
+        if self.scans and (call := self.scans[0].simulating("surface.scans[0]")):
             remedy = f"{call} simulates one scan"
         elif call := self.simulating():
             remedy = f"{call} simulates the map"
@@ -380,7 +381,9 @@ class SpectralSurface(AnySurface):
         C = np.concatenate(
             [self.power_spectrum(q[:1]), self.C[inside], self.power_spectrum(q[-1:])]
         )
-        less = dataclasses.replace(self, **NO_MAP, q=q, C=C, samples=None)
+        scans = tuple(scan.between(low, high) for scan in self.scans)
+        changed = {**NO_MAP, "scans": scans, "q": q, "C": C, "samples": None}
+        less = dataclasses.replace(self, **changed)
         return dataclasses.replace(
             less, heights=self.heights.scaled(float(less.h_rms / self.h_rms))
         )
@@ -425,6 +428,7 @@ class SpectralSurface(AnySurface):
             q[distinct],
             C[distinct],
             heights=self.heights.convolved(other.heights),
+            scans=self._scans_added(other),
             anisotropy=stretch,
             unit=self.unit,
             provenance=(
@@ -433,6 +437,15 @@ class SpectralSurface(AnySurface):
             ),
         )
         return both.resolved() if self.resolution or other.resolution else both
+
+    def _scans_added(self, other: SpectralSurface) -> tuple[Self, ...]:
+        """Sums of the scans of both surfaces, each of which is its own scan where it has none."""
+        one = self.scans or (self,)
+        two = other.scans or (other,)
+        count = max(len(one), len(two))
+        if count == 1:
+            return ()
+        return tuple(one[k % len(one)].added(two[k % len(two)]) for k in range(count))
 
     def resolved(self) -> Self:
         """The same measured surface, with a record of what its shortest octave contributes."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import finite_array, hinted
+from mbma_tables.common.arguments import finite_array, hinted, require_flag
 from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.roughness import ASSUMED
@@ -254,35 +254,45 @@ class Surface(SelfAffine):
         heights: Any,
         dx: Any = None,
         *,
+        across: Any = None,
+        isotropic: bool = False,
         h_max: float | None = None,
         nominal_area: float | str | None = None,
         extrapolate_to: Any = None,
         extrapolate_hurst: float | None = None,
         **treatment: Any,
     ) -> MeasuredSurface:
-        """The isotropic surface from a measured line scan, for example by a stylus.
+        """The isotropic surface from measured line scans, for example by a stylus.
 
         Parameters
         ----------
-        heights : array_like, shape (n,), path or line scan
+        heights : array_like, shape (n,), path or line scan, or a list of these
             Heights [length], at least 32; a file that SurfaceTopography reads as a line
-            scan, of two columns for instance; or such a line scan.
+            scan, of two columns for instance; or such a line scan. Of several parallel
+            traces each counts by its length.
         dx : float, optional
-            Sampling step [length], of an array.
+            Sampling step [length], of arrays.
+        across : as heights, optional
+            Traces at right angles to the others, of the same sampling step.
+        isotropic : bool, optional
+            Whether the surface is known to have no lay. Of traces in one direction, results
+            are not `valid` without it; it is stated among the assumptions.
         extrapolate_to, extrapolate_hurst, **treatment : as for `from_map`
         h_max, nominal_area : as for `Surface`
-            By default h_max is that of the line, which is lower than that of a surface.
+            By default h_max is that of the lines, which is lower than that of a surface.
 
         Returns
         -------
         MeasuredSurface
-            Its `provenance` has the accuracy of h_rms and gradient, and the limitations of
-            a single trace.
+            Its `provenance` has the accuracy of h_rms and gradient. Its `scans` are
+            surfaces that differ from it by the sampling error of spectrum, height and
+            gradient; what laws of them differ by adds to the scatter of contacts.
 
         Raises
         ------
         InputError, OutOfRangeError
-            For input that is no line scan, holds too few wavelengths, or is flat.
+            For input that is no line scan, holds too few wavelengths, or is flat, for
+            traces of which only some have a unit, and for isotropic beside across.
 
         Examples
         --------
@@ -291,18 +301,26 @@ class Surface(SelfAffine):
         >>> noise = np.fft.rfft(np.random.default_rng(1).standard_normal(4000))
         >>> line = np.fft.irfft(noise * np.minimum(1, (np.arange(2001) / 40.0 + 1e-9) ** -1.3))
         >>> surface = Surface.from_profile(line, dx=0.5, unit="um", periodic=True)
-        >>> print(surface.provenance[-3]["told"])
-        h_rms is known to 5.2% and the rms gradient to 1.4%
-        (one standard error, of a Gaussian surface)
+        >>> [record["told"] for record in surface.provenance if record["step"] == "errors"]
+        ['h_rms is known to 5.2% and the rms gradient to 1.4% (one standard error, of a Gaussian surface)']
         """
-        from mbma_tables.surfaces.maps import measured_surface, prepared
+        from mbma_tables.surfaces.maps import measured_traces
 
-        treated = prepared(heights, treatment | {"dx": dx}, 1)
-        measured = measured_surface(treated, h_max, extrapolate_to, extrapolate_hurst)
-        highest = measured.h_max if nominal_area is None else h_max
-        return dataclasses.replace(
-            MeasuredSurface.of(measured), h_max=highest, nominal_area=nominal_area
+        require_flag("isotropic", isotropic)
+        options = treatment | {"dx": dx}
+        measured = measured_traces(
+            heights, across, options, isotropic, extrapolate_to, extrapolate_hurst
         )
+
+        def with_top(surface: MeasuredSurface) -> MeasuredSurface:
+            scans = tuple(map(with_top, surface.scans))
+            if nominal_area is not None:
+                changed: dict[str, Any] = {"h_max": h_max, "nominal_area": nominal_area}
+            else:
+                changed = {"h_max": surface.h_max if h_max is None else h_max}
+            return dataclasses.replace(surface, **changed, scans=scans)
+
+        return with_top(MeasuredSurface.of(measured))
 
     def sampled(self) -> MeasuredSurface:
         """The same surface by its spectrum, of which two samples suffice; not for a batch."""
@@ -325,12 +343,11 @@ class MeasuredSurface(SpectralSurface):
     @classmethod
     def of(cls, spectral: SpectralSurface) -> MeasuredSurface:
         """The same spectrum, with the fit of five numbers."""
-        return cls(
-            **{
-                field.name: getattr(spectral, field.name)
-                for field in dataclasses.fields(spectral)
-            }
-        )
+        fields = {
+            field.name: getattr(spectral, field.name)
+            for field in dataclasses.fields(spectral)
+        }
+        return cls(**{**fields, "scans": tuple(map(cls.of, spectral.scans))})
 
     def fit(self, band: tuple[float, float] | None = None) -> Surface:
         """The self-affine surface nearest to it: five numbers, and the quality of the fit.

@@ -31,6 +31,10 @@ from mbma_tables.theories.evidence import shipped_deviations
 from mbma_tables.theories.inversion import FEW_LOOKS, LOOKS, Curve, Indices
 
 PACKAGE = "mbma_tables."
+UNSAMPLED = (
+    "what several scans or the sampling error of traces add to the scatter is known for "
+    "theory='calibrated' only"
+)
 ROUNDING = 4 * float(np.finfo(float).eps)  # relative, of gaps beside the ends of a domain
 
 
@@ -209,7 +213,8 @@ class Theory(abc.ABC):
 
         Or why it differs from the surfaces that were tested.
         """
-        return surface.departures()
+        found = surface.departures()
+        return (*found, UNSAMPLED) if getattr(surface, "scans", ()) else found
 
     def scatter_name(self, surface: AnySurface) -> str:
         """Name under which its scatter against boundary elements is stored."""

@@ -1,12 +1,15 @@
 """Line scans: traces of surfaces that are known."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from helpers import refusals, topographies
 
-from mbma_tables import Surface
+from mbma_tables import Surface, contact
 from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces import profiles
+from mbma_tables.surfaces.surface import assumptions
 
 POINTS = 8000
 SHORTEST = 2 * np.pi / 6  # six sampling steps a wave
@@ -174,11 +177,108 @@ def test_a_line_of_few_waves_keeps_its_variance_and_gradient(wave):
 def test_sums_over_panels_do_not_depend_on_blocks(monkeypatch):
     q = np.arange(1.0, 500.0)
     fine = np.geomspace(0.5, 500.0, 81)
+    width = np.random.default_rng(4).random(q.size)
     starts = np.array([0, 3, 40, 200])
     sides = 4 * np.pi * np.sqrt(np.maximum(fine**2 - q[:, None] ** 2, 0))
-    expected = np.add.reduceat(np.diff(sides, axis=1), starts, axis=0)
+    each = width[:, None] * np.diff(sides, axis=1)
+    expected = np.add.reduceat(each, starts, axis=0)
     for block in (7, 10_000):
         monkeypatch.setattr(profiles, "BLOCK", block)
         np.testing.assert_allclose(
-            profiles._panel_sums(fine, q, starts), expected, rtol=1e-12
+            profiles._panel_sums(fine, q, width, starts), expected, rtol=1e-12
         )
+
+
+class TestSeveral:
+    """Several traces of one surface, along and across its lay."""
+
+    def test_each_counts_by_its_length(self):
+        short, long = rough_line(1)[:2000], rough_line(2)
+        alone = [Surface.from_profile(line, 0.5) for line in (short, long)]
+        both = Surface.from_profile([short, long], 0.5)
+        for name in ("h_rms", "rms_gradient"):
+            squares = [float(getattr(one, name)) ** 2 for one in alone]
+            expected = np.average(squares, weights=[short.size, long.size]) ** 0.5
+            # each spectrum ends where it has a thousandth of its squared gradient
+            assert getattr(both, name) == pytest.approx(expected, rel=2e-3)
+        assert both.h_max == max(one.h_max for one in alone)
+        twice = Surface.from_profile([long, long], 0.5)
+        assert twice.rms_gradient == pytest.approx(alone[1].rms_gradient, rel=1e-4)
+
+    def test_replicas_differ_as_traces_do(self):
+        lines = [rough_line(seed) for seed in range(12)]
+        found = [Surface.from_profile(line, 1.0) for line in lines]
+        for name in ("h_rms", "rms_gradient", "alpha"):
+            of_traces = np.std([np.log(getattr(one, name)) for one in found], ddof=1)
+            of_replicas = np.mean(
+                [np.std(np.log([getattr(s, name) for s in one.scans])) for one in found]
+            )
+            # twelve traces know their standard deviation to 21%
+            assert 1 / 1.6 < of_replicas / of_traces < 1.8
+        many = Surface.from_profile(lines[:9], 1.0)
+        spread = np.std(np.log([scan.rms_gradient for scan in many.scans]))
+        of_one = np.std(np.log([scan.rms_gradient for scan in found[0].scans]))
+        assert spread == pytest.approx(of_one / 3, rel=0.45)
+
+    def test_their_spread_adds_to_the_scatter(self):
+        lines = [0.01 * rough_line(seed) for seed in range(3)]
+        surface = Surface.from_profile(lines, 1.0, isotropic=True)
+        clean = dataclasses.replace(surface, provenance=())
+        found = [
+            contact(one, area=[0.02, 0.2], theory="calibrated")
+            for one in (clean, dataclasses.replace(clean, scans=()))
+        ]
+        pressures = found[0].pressure
+        areas = [
+            contact(
+                dataclasses.replace(scan, provenance=()),
+                pressure=pressures,
+                theory="calibrated",
+            ).area
+            for scan in surface.scans
+        ]
+        spread = np.std(np.log(areas), axis=0, ddof=1)
+        added = np.sqrt(found[0].area_scatter ** 2 - found[1].area_scatter ** 2)
+        assert added == pytest.approx(spread, rel=1e-3)
+        assert (spread > 0.005).all()
+        # what is made of it has the spread, too
+        other = clean.combined(Surface(0.8, 0.05, 1.0, 0.05, 0.2))
+        assert len(other.scans) == len(clean.scans)
+
+    def test_traces_across_tell_the_lay(self):
+        along = [rough_line(seed) for seed in range(2)]
+        across = [rough_line(seed)[::2] for seed in range(5, 7)]
+        found = Surface.from_profile(along, 1.0, across=across)
+        # the second ones are twice as steep
+        assert found.anisotropy == pytest.approx(2.0, rel=0.06)
+        m2 = [Surface.from_profile(lines, 1.0).m2 for lines in (along, across)]
+        assert found.m2 == pytest.approx(np.mean(m2), rel=0.01)
+        assert not any("isotropy is assumed" in doubt for doubt in found.doubts)
+
+    def test_isotropy_is_assumed_or_stated(self):
+        line = rough_line()
+        found = Surface.from_profile(line, 1.0)
+        assert any("isotropy is assumed" in doubt for doubt in found.doubts)
+        stated = Surface.from_profile(line, 1.0, isotropic=True)
+        assert not any("isotropy is assumed" in doubt for doubt in stated.doubts)
+        assert any("the surface is isotropic" in each for each in assumptions(stated))
+
+    def test_refusals(self, tmp_path):
+        line = rough_line()
+        with pytest.raises(InputError, match="isotropic=True is of traces in one"):
+            Surface.from_profile(line, 1.0, across=line, isotropic=True)
+        with pytest.raises(InputError, match="isotropic"):
+            Surface.from_profile(line, 1.0, isotropic="yes")
+        library = topographies()
+        named = library.UniformLineScan(line, 1.0 * POINTS, unit="um")
+        plain = library.UniformLineScan(line, 1.0 * POINTS)
+        with pytest.raises(InputError, match="some traces have a unit"):
+            Surface.from_profile([named, plain])
+        finer = library.UniformLineScan(1e3 * line, 1e3 * POINTS, unit="nm")
+        both = Surface.from_profile([named, finer])
+        assert both.unit == "um"
+        assert both.h_rms == pytest.approx(Surface.from_profile(named).h_rms, rel=1e-4)
+        with pytest.raises(InputError, match="finite"):
+            Surface.from_profile([line, np.append(line, np.inf)], 1.0)
+        with pytest.raises(InputError, match="too few wavelengths"):
+            Surface.from_profile([line, line[:20]], 1.0)

@@ -196,7 +196,7 @@ def _bound(surface: AnySurface, value: FloatArray) -> Batch:
 
 
 def _spread(surface: MeasuredSurface, quantity: str, area: FloatArray) -> FloatArray:
-    """Standard deviation of ln of a quantity from scan to scan of an averaged surface, at its contact areas."""
+    """Standard deviation of ln of a quantity from scan to scan of a surface of several, at its contact areas."""
     law = _own_law(surface)
     u = law.mean_separation("area", np.clip(area, *LIKE_SCANS))
     (pressure, _, steep), _ = law.answer(u)
@@ -409,7 +409,11 @@ class Calibrated(Theory):
         if not self.by_heights(surface):
             stated = super().scatter(surface, quantity, area)
             doublings = tested.beyond_all(surface)
-            return np.hypot(stated, WIDE_SCATTER.get(quantity, 0.0) * doublings**0.5)
+            wide = np.hypot(stated, WIDE_SCATTER.get(quantity, 0.0) * doublings**0.5)
+            if not getattr(surface, "scans", ()) or np.isnan(wide).all():
+                return np.asarray(wide)
+            assert isinstance(surface, MeasuredSurface)
+            return np.asarray(np.hypot(wide, _spread(surface, quantity, area)))
         assert isinstance(surface, MeasuredSurface)
         if surface.outside(PRESSED):
             return np.full(np.shape(area), np.nan)
