@@ -228,6 +228,10 @@ _joint_options = option_group(
     show_default=True,
     help="Processes that compute rows.",
 )
+@click.option(
+    "--draws", type=int, help="For each row with ranges; rows then have quantiles."
+)
+@click.option("--seed", type=int, default=0, help="Of the random numbers.")
 def batch_command(
     designs: Path,
     out: Path,
@@ -236,12 +240,17 @@ def batch_command(
     quantities: str | None,
     keep: str,
     workers: int,
+    draws: int | None,
+    seed: int,
 ) -> None:
     """Quantities of a joint for each row of the table DESIGNS (.csv, .parquet, .nc).
 
     Columns are named as entries of a joint's file, with their unit: 'part_a.Ra [um]',
     'bodies.hardness [GPa]', 'nominal_area [cm^2]', and 'pressure [MPa]' or another load. Rows that
     are refused stay in the table, and the column "reason" says why.
+
+    With --draws cells may be ranges, '0.3..0.5' below '[um]' or '0.4 um +- 10%', and rows have
+    medians with their quantiles 5% and 95%.
 
     Example: mbma batch examples/designs.csv --file examples/joint.toml --out answers.csv
     """
@@ -256,6 +265,8 @@ def batch_command(
         keep=[name for name in keep.split(",") if name],
         path="joint" if file is None else file,
         workers=workers,
+        draws=draws,
+        seed=seed,
     )
     echo(
         f"mbma batch: {found.rows} rows, {found.refused} of them refused, "

@@ -16,6 +16,11 @@ import numpy as np
 from mbma_tables.bodies.bodies import Bodies, names_metals
 from mbma_tables.bodies.materials import Metal
 from mbma_tables.common.arguments import FloatArray, nearest, whole_number_in
+from mbma_tables.common.distributions import (
+    MEASURED,
+    Distribution,
+    distribution_of,
+)
 from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.common.progress import doing, shown
 from mbma_tables.common.toml_files import set_entry, value_of
@@ -43,12 +48,14 @@ from mbma_tables.design.row_files import (
     opened,
     require_writable,
 )
+from mbma_tables.design.uncertainty import MOST_DRAWS, Uncertainty, uncertainty_of
 from mbma_tables.surfaces.surface import Surface
 
 # arguments whose cells are no numbers
 NAMES = ("bodies", "metals", "gas", "name", "theory", "direction", "process")
 REASON = "reason"
 VALID = "valid"
+ENDS = ("_low", "_high")  # of the columns of quantiles
 # units of arguments that are neither lengths nor stresses
 OTHER_UNITS = {"force": "N", "conductivity": "W/(m K)", "temperature": "K"}
 MOST_WORKERS = 256
@@ -133,8 +140,14 @@ class Column:
             units = Units(stress="Pa")
         return float(units.number(self.argument, f"1 {self.unit}"))
 
-    def numbers(self, cells: Any, units: Units) -> tuple[FloatArray, dict[int, str]]:
-        """Numbers in these units, NaN where there are none, and why."""
+    def numbers(
+        self, cells: Any, units: Units, ranges: dict[int, Any] | None = None
+    ) -> tuple[FloatArray, dict[int, str]]:
+        """Numbers in these units, NaN where there are none, and why.
+
+        Ranges are entered in `ranges`, by row as they would be typed; without it they are
+        faults.
+        """
         is_plain = self.needs_unit and not self.unit
         try:
             given = cells if isinstance(cells, np.ndarray) else list(map(float, cells))
@@ -146,17 +159,43 @@ class Column:
         texts = cells
         if isinstance(cells, np.ndarray):
             texts = ["" if cell != cell else repr(cell) for cell in cells.tolist()]
-        return self._cell_by_cell(texts, units)
+        return self._cell_by_cell(texts, units, ranges)
+
+    def range_of(self, cell: Any) -> Distribution | None:
+        """The distribution in a cell; None of other cells.
+
+        Raises
+        ------
+        InputError
+            For a range that is upside down or none, and one without a unit.
+        """
+        if not isinstance(cell, str) or not (RANGE.search(cell) or MEASURED in cell):
+            return None
+        found = distribution_of(self.argument, value_of(cell))
+        if found is not None and bool(found.unit) == bool(self.unit) and self.needs_unit:
+            fault = "has a unit beside that of its header" if self.unit else "has no unit"
+            raise InputError(f"{self.name} = {cell!r} {fault}: write it once")
+        return found
+
+    def typed(self, found: Distribution) -> Any:
+        """What is typed for a distribution in a cell: with the unit of the header, but of a temperature."""
+        if not self.unit or self.argument == "temperature":
+            return value_of(found.text) if found.kind == MEASURED else found.text
+        return found.retyped(1.0, self.unit)
 
     def _cell_by_cell(
-        self, cells: Sequence[str], units: Units
+        self, cells: Sequence[str], units: Units, ranges: dict[int, Any] | None
     ) -> tuple[FloatArray, dict[int, str]]:
         numbers = np.full(len(cells), np.nan)
         faults = {}
         factor = self.factor_to(units)
         for k, cell in enumerate(cells):
             try:
-                numbers[k] = self._number(cell, units, factor)
+                found = None if ranges is None else self.range_of(cell)
+                if ranges is not None and found is not None:
+                    ranges[k] = self.typed(found)
+                else:
+                    numbers[k] = self._number(cell, units, factor)
             except InputError as fault:
                 text = str(fault)
                 said = text if self.argument in text else f"{self.name}: {text}"
@@ -181,9 +220,10 @@ class Column:
                     f"'{self.name} [{sample}]'"
                 )
             return number * factor
-        if RANGE.search(cell):
+        if self.range_of(cell) is not None:
             raise InputError(
-                f"{self.name} = {cell!r} is a range, and a row has one number"
+                f"{self.name} = {cell!r} is a range, and a row has one number: quantiles "
+                "are those of --draws, as in draws=2000"
             )
         if self.unit:
             raise InputError(
@@ -196,6 +236,14 @@ class Column:
         return float(units.number(self.argument, cell))
 
 
+class Draws(NamedTuple):
+    """Draws of numbers that are ranges, for each row."""
+
+    of_each_row: int
+    seed: int
+    quantities: Sequence[str] | None  # that were asked for
+
+
 @dataclasses.dataclass(frozen=True)
 class Designs:
     """The columns of a table of designs, and what all rows have in common."""
@@ -204,6 +252,7 @@ class Designs:
     common: Mapping[str, Any]  # entries as those of a file of a joint, with the load
     units: Units  # of all numbers: lengths and stresses
     path: pathlib.Path = pathlib.Path("joint")  # of the file of common entries
+    draws: Draws | None = None  # where cells may be ranges
 
     def require_load(self) -> str:
         """The name of what is given, a pressure, a gap, an area or a force; an error for none and several."""
@@ -223,7 +272,7 @@ class Designs:
         for column in self.columns:
             if not column.is_name:
                 value = numbers[column.name]
-                if column.argument == "conductivity":
+                if column.argument == "conductivity" and not is_typed(value):
                     value = _conductivity(column, value)
                 set_entry(entries, column.name, value)
         entries = {name: _listed(entry) for name, entry in entries.items()}
@@ -247,6 +296,11 @@ def _in_unit_of_results(bodies: Any) -> Any:
         return bodies
     number = Units(stress=PLAIN_STRESS).number("E_star", bodies)
     return f"{number!r} {PLAIN_STRESS}"
+
+
+def is_typed(value: Any) -> bool:
+    """Whether a number of a row is as it was typed, with its unit."""
+    return isinstance(value, str | Mapping)
 
 
 def _conductivity(column: Column, value: Any) -> Any:
@@ -282,8 +336,12 @@ class Answers:
     reasons: list[str]
 
     @classmethod
-    def empty(cls, names: Sequence[str], rows: int, units: dict[str, str]) -> Answers:
-        """Of rows that are not computed yet; units are shared by all chunks."""
+    def empty(
+        cls, names: Sequence[str], rows: int, units: dict[str, str], ends: bool = False
+    ) -> Answers:
+        """Of rows that are not computed yet, perhaps with both ends of bands; units are shared by all chunks."""
+        if ends:
+            names = [f"{name}{end}" for name in names for end in ("", *ENDS)]
         values = {name: np.full(rows, np.nan) for name in names}
         return cls(values, units, [""] * rows, [""] * rows)
 
@@ -306,6 +364,49 @@ class Answers:
             for row in rows[np.broadcast_to(mask, rows.shape)].tolist():
                 earlier = self.reasons[row]
                 self.reasons[row] = f"{earlier}; {reason}" if earlier else reason
+
+    def put_quantiles(self, row: int, found: Uncertainty) -> None:
+        """Enter medians and quantiles of a row."""
+        for name, (low, median, high) in found.quantiles.items():
+            if name not in self.values:
+                continue
+            if self.units.setdefault(name, found.units[name]) != found.units[name]:
+                raise InputError(
+                    f"{name} is in {found.units[name]}, and in {self.units[name]} in rows before"
+                )
+            for end, numbers in zip(("", *ENDS), (median, low, high), strict=True):
+                self.values[f"{name}{end}"][row] = numbers[0]
+        self.valid[row] = "yes" if found.valid.all() else "no"
+        self.reasons[row] = "; ".join(found.reasons)
+
+
+def _solve_draws(
+    designs: Designs,
+    numbers: Mapping[str, Any],
+    typed: Mapping[int, Mapping[str, Any]],
+    rows: Any,
+    answers: Answers,
+) -> None:
+    """Compute rows one after the other, each with quantiles of what is not known."""
+    assert designs.draws is not None
+    for row in rows.tolist():
+        some: dict[str, Any] = {
+            name: column[row].item() for name, column in numbers.items()
+        }
+        try:
+            joint, given = designs.joint(some | dict(typed.get(row, {})))
+            found = uncertainty_of(
+                joint.description,
+                given["pressure"],
+                draws=designs.draws.of_each_row,
+                quantities=designs.draws.quantities,
+                seed=designs.draws.seed,
+                may_be_known=True,
+            )
+            answers.put_quantiles(row, found)
+        except MbmaError as fault:
+            answers.reasons[row] = str(fault)
+            answers.valid[row] = ""
 
 
 def _solve(
@@ -343,8 +444,9 @@ def answered(
     designs: Designs, chunk: Chunk, names: Sequence[str], units: dict[str, str]
 ) -> tuple[Answers, dict[str, FloatArray]]:
     """Quantities of a chunk of rows, and its numbers by column."""
-    answers = Answers.empty(names, chunk.rows, units)
+    answers = Answers.empty(names, chunk.rows, units, designs.draws is not None)
     faults = dict(chunk.faults)
+    typed: dict[int, dict[str, Any]] = {}
     numbers: dict[str, FloatArray] = {}
     texts: list[Column] = []
     for column in designs.columns:
@@ -354,7 +456,10 @@ def answered(
             missing = [k for k, cell in enumerate(cells) if not str(cell).strip()]
             new = dict.fromkeys(missing, EMPTY.format(name=column.name))
         else:
-            numbers[column.name], new = column.numbers(cells, designs.units)
+            of_column: dict[int, Any] | None = None if designs.draws is None else {}
+            numbers[column.name], new = column.numbers(cells, designs.units, of_column)
+            for row, entry in (of_column or {}).items():
+                typed.setdefault(row, {})[column.name] = entry
         for row, fault in new.items():
             faults[row] = f"{faults[row]}; {fault}" if row in faults else fault
     for row, fault in faults.items():
@@ -370,7 +475,10 @@ def answered(
         given = {c.name: _name_of(cell) for c, cell in zip(texts, key, strict=True)}
         common = _with(designs.common, given)
         own = dataclasses.replace(designs, common=common)
-        _solve(own, numbers, np.array(members), answers)
+        if designs.draws is None:
+            _solve(own, numbers, np.array(members), answers)
+        else:
+            _solve_draws(own, numbers, typed, np.array(members), answers)
     return answers, numbers
 
 
@@ -442,6 +550,16 @@ def names_of_results(load: str, quantities: Sequence[str] | None) -> list[str]:
     return [name for name in dict.fromkeys(names) if name != VALID]
 
 
+def names_of_medians(load: str, quantities: Sequence[str] | None) -> list[str]:
+    """Quantities of which rows have medians and quantiles: those asked for, or those with a model uncertainty."""
+    if load not in ("pressure", "force"):
+        raise InputError(f"draws are of joints at a pressure or a force, got {load}")
+    asked = registry.results() if quantities is None else list(quantities)
+    for name in asked:
+        registry.get(name)
+    return [name for name in dict.fromkeys(asked) if name not in (load, "pressure")]
+
+
 @dataclasses.dataclass(frozen=True)
 class Summary:
     """How many rows a table had, and how many of them have no answer or one that is not valid."""
@@ -460,6 +578,8 @@ def batch(
     keep: Sequence[str] = (),
     path: str | os.PathLike[str] = "joint",
     workers: int = 1,
+    draws: int | None = None,
+    seed: int = 0,
 ) -> Summary:
     r"""Compute a joint for each row of a table, and write the rows with every quantity beside them.
 
@@ -482,6 +602,13 @@ def batch(
         Columns that are no arguments, to be written as they are.
     path : path-like
         File of the common entries, for paths of maps.
+    draws : int, optional
+        Of numbers that are ranges, in cells or in common entries, "0.3..0.5 um", "0.4 um +-
+        10%": rows then have the median of each quantity and, in columns that end with
+        "_low" and "_high", its quantiles 5% and 95%, of inputs and model, as of
+        `Joint.uncertainty`. Without it a range is refused.
+    seed : int
+        Of the draws.
     workers : int
         Processes that compute rows; their order and numbers do not depend on it. A script
         that asks for more than one needs ``if __name__ == "__main__":`` around its calls.
@@ -519,7 +646,14 @@ def batch(
     whole_number_in("workers", workers, 1, MOST_WORKERS)
     with opened(pathlib.Path(designs)) as source, shown("rows"):
         table = designs_of(source, common or {}, keep, pathlib.Path(path))
-        names = names_of_results(table.require_load(), quantities)
+        load = table.require_load()
+        if draws is None:
+            names = names_of_results(load, quantities)
+        else:
+            whole_number_in("draws", draws, 100, MOST_DRAWS)
+            names = names_of_medians(load, quantities)
+            drawn = Draws(draws, seed, quantities)
+            table = dataclasses.replace(table, draws=drawn)
         clashes = [name for name in source.units if name in (*names, VALID, REASON)]
         if clashes:
             listed = ", ".join(clashes)
@@ -548,7 +682,9 @@ class Task:
         columns = dict(chunk.columns)
         if not self.as_text:
             columns |= {
-                name: each / _factor(self.designs, name) for name, each in numbers.items()
+                name: each / _factor(self.designs, name)
+                for name, each in numbers.items()
+                if self.designs.draws is None or isinstance(columns[name], np.ndarray)
             }
         columns |= answers.values
         columns |= {VALID: answers.valid, REASON: answers.reasons}
@@ -582,8 +718,10 @@ def _written(
     of_first: dict[str, str] = {}
     answers, numbers = answered(designs, first, names, of_first)
     units = dict(source.units)
+    ends = ("",) if designs.draws is None else ("", *ENDS)
     for name in names:
-        units[name] = of_first.get(name) or registry.get(name).unit_in(designs.units)
+        unit = of_first.get(name) or registry.get(name).unit_in(designs.units)
+        units |= {f"{name}{end}": unit for end in ends}
     units |= dict.fromkeys((VALID, REASON), "")
     task = Task(designs, names, units, is_csv(target))
 

@@ -323,7 +323,7 @@ class Joint(JointQuantities, Displayed):
             )
 
     @property
-    def _description(self) -> Description:
+    def description(self) -> Description:
         """How contacts are made of drawn numbers."""
 
         def make(numbers: Mapping[str, Any]) -> Pressed:
@@ -372,7 +372,7 @@ class Joint(JointQuantities, Displayed):
         array([ True])
         """
         return uncertainty_of(
-            self._description,
+            self.description,
             pressure,
             draws=draws,
             quantiles=quantiles,
@@ -395,7 +395,7 @@ class Joint(JointQuantities, Displayed):
         >>> len(drops), min(drops) < max(drops)
         (100, np.True_)
         """
-        return replicas_of(self._description, n, seed)
+        return replicas_of(self.description, n, seed)
 
     @property
     def pair(self) -> Pair | None:

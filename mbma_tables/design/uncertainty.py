@@ -116,7 +116,6 @@ class Description:
     def with_load(self, load: Load) -> Description:
         """The same with pressures that are distributions as the last input."""
         inputs = {**self.inputs, **load.inputs}
-        require_inputs(inputs, self.what)
         return dataclasses.replace(self, inputs=inputs)
 
     def levels(self, draws: int, seed: int) -> FloatArray:
@@ -227,13 +226,15 @@ def _evaluated(
     names = _names(central, quantities)
     drawn = description.drawn(levels)
     typed = {name: inputs[name].written(rows[:, None]) for name, rows in drawn.items()}
-    pressures = load.at_all(levels[:, -1])
+    # of the load, if it is a distribution: the last input then
+    last = levels[:, -1] if inputs else np.zeros(len(levels))
+    pressures = load.at_all(last)
     try:
         pressed = description.make(typed)(pressures)
         batches = [_of_contact(pressed, names, (len(levels), len(load.given)))]
     except InputError:
         # a number out of range is refused again there
-        rows = [load.at(level) for level in levels[:, -1].tolist()]
+        rows = [load.at(level) for level in last.tolist()]
         batches = list(_one_by_one(description, typed, rows, names))
     reasons: dict[str, NDArray[np.bool_]] = {}
     for part in batches:
@@ -530,13 +531,19 @@ def uncertainty_of(
     quantiles: ArrayLike = LEVELS,
     quantities: Sequence[str] | None = None,
     seed: int = 0,
+    may_be_known: bool = False,
 ) -> Uncertainty:
-    """Quantiles and shares of a description at pressures; see `uncertainty`."""
+    """Quantiles and shares of a description at pressures; see `uncertainty`.
+
+    With `may_be_known` of one without ranges, too, whose quantiles are those of the model.
+    """
     whole_number_in("draws", draws, 100, MOST_DRAWS)
     whole_number_in("seed", seed, 0, 2**63 - 1)
     levels = _checked_levels(quantiles)
     load = Load.of(pressure)
     description = description.with_load(load)
+    if not may_be_known:
+        require_inputs(description.inputs, description.what)
     uniform = description.levels(draws, seed)
     corners = description.corners()
     # corners first: where one is refused, no draws are made in vain

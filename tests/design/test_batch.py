@@ -369,3 +369,102 @@ def test_memory_does_not_grow_with_the_table(tmp_path, workers):
         largest.append(int(ran.stdout))
     # 240,000 rows more would be 30 MB of numbers and texts alone
     assert largest[1] < largest[0] + 15_000
+
+
+RANGED = (
+    "design,part_a.Ra [um],part_b.Rq,bodies.hardness [GPa],pressure [MPa]\n"
+    "1,0.35..0.45,0.7 um,1.2,10\n"
+    "2,0.4,0.7 um +- 5%,1.1..1.3,8..12\n"
+    "3,0.4,0.7 um,1.2,10\n"
+    '4,"{measured = [0.3, 0.4, 0.6]}",0.7 um,1.2,10\n'
+    "5,0.45..0.35,0.7 um,1.2,10\n"
+    "6,0.4,0.7 um,1.3 GPa..1.2 GPa,10\n"
+    "7,0.4,0.6..0.7,1.2,10\n"
+    "8,0.35 um..0.45 um,0.7 um,1.2,10\n"
+    "9,-0.1..0.45,0.7 um,1.2,10\n"
+)
+RANGED_COMMON = {
+    "part_a": BAND | {"longest": "0.5 mm"},
+    "part_b": BAND | {"longest": "0.5 mm"},
+    "bodies": {"metals": "steel 1020"},
+    "nominal_area": "4 cm^2",
+}
+
+
+def ranged_joint(Ra, Rq, hardness):
+    return Joint(
+        RANGED_COMMON["part_a"] | {"Ra": Ra},
+        RANGED_COMMON["part_b"] | {"Rq": Rq},
+        bodies=Bodies(metals="steel 1020", hardness=hardness),
+        nominal_area="4 cm^2",
+    )
+
+
+def test_cells_may_be_ranges_whose_rows_have_quantiles(tmp_path):
+    path = tmp_path / "designs.csv"
+    path.write_text(RANGED)
+    out = tmp_path / "answers.csv"
+    asked = ["area", "total_conductance"]
+    options = {"common": RANGED_COMMON, "quantities": asked, "keep": ["design"]}
+    found = batch(path, out, draws=300, seed=2, **options)
+    assert (found.rows, found.refused) == (9, 5)
+    rows = rows_of(out)
+    joints = [
+        (ranged_joint("0.35..0.45 um", "0.7 um", "1.2 GPa"), "10 MPa"),
+        (ranged_joint("0.4 um", "0.7 um +- 5%", "1.1..1.3 GPa"), "8..12 MPa"),
+        None,
+        (
+            ranged_joint(
+                {"measured": ["0.3 um", "0.4 um", "0.6 um"]}, "0.7 um", "1.2 GPa"
+            ),
+            "10 MPa",
+        ),
+    ]
+    headers = {"area": "area", "total_conductance": "total_conductance{} [W/(m^2 K)]"}
+    headers["area"] = "area{}"
+    for row, one in zip(rows, joints, strict=False):
+        if one is None:
+            continue
+        joint, pressure = one
+        alone = joint.uncertainty(pressure, draws=300, seed=2, quantities=asked)
+        for name, header in headers.items():
+            cells = [float(row[header.format(end)]) for end in ("_low", "", "_high")]
+            np.testing.assert_allclose(cells, alone.quantiles[name][:, 0], rtol=1e-9)
+        assert row["valid"] == ("yes" if alone.valid.all() else "no")
+    # a row of known numbers has the model's band
+    pressed = ranged_joint("0.4 um", "0.7 um", "1.2 GPa").at_pressure("10 MPa")
+    low, high = (float(rows[2][f"area{end}"]) for end in ("_low", "_high"))
+    width = 2 * 1.6449 * float(pressed.area_scatter)
+    assert np.log(high / low) == pytest.approx(width, rel=0.2)
+    said = [
+        "Ra = '0.45..0.35': the range is upside down",
+        "hardness = '1.3 GPa..1.2 GPa': the range is upside down",
+        "part_b.Rq = '0.6..0.7' has no unit",
+        "part_a.Ra = '0.35 um..0.45 um' has a unit beside that of its header",
+        "Ra must be positive",
+    ]
+    for row, reason in zip(rows[4:], said, strict=True):
+        assert reason in row["reason"]
+        assert (row["area"], row["area_low"], row["valid"]) == ("", "", "")
+    # without draws a range is refused, and one that is none for what is wrong with it
+    batch(path, out, **options)
+    rows = rows_of(out)
+    assert "is a range, and a row has one number: quantiles" in rows[0]["reason"]
+    assert "the range is upside down" in rows[4]["reason"]
+
+
+def test_ranges_that_all_rows_have_in_common(tmp_path):
+    path = tmp_path / "designs.csv"
+    path.write_text("part_a.Ra [um],force [kN]\n0.4,4\n0.8,4..5\n")
+    common = RANGED_COMMON | {"part_b": RANGED_COMMON["part_b"] | {"Rq": "0.6..0.8 um"}}
+    out = tmp_path / "answers.nc"
+    batch(path, out, common=common, quantities=["area"], draws=100)
+    joint = ranged_joint("0.8 um", "0.6..0.8 um", None)
+    pressure = joint.pressure_of("4..5 kN")
+    alone = joint.uncertainty(pressure, draws=100, quantities=["area"])
+    with netCDF4.Dataset(out) as data:
+        cells = [data[f"area{end}"][1] for end in ("_low", "", "_high")]
+    np.testing.assert_allclose(cells, alone.quantiles["area"][:, 0], rtol=1e-9)
+    path.write_text("part_a.Ra [um],area\n0.4,0.01\n")
+    with pytest.raises(InputError, match="at a pressure or a force, got area"):
+        batch(path, out, common=common, draws=100)
