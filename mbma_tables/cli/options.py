@@ -249,6 +249,11 @@ _MAP_OPTIONS = (
     _option("long_cutoff", "Longest wavelength to keep [length]."),
     _option("s_filter", "Nesting index of an S-filter, ISO 25178 [length],"),
     _option("l_filter", "and of an L-filter [length]."),
+    _option(
+        "confirmed",
+        "What looks like an artefact and is the surface, such as 'bow,spikes'.",
+        metavar="NAMES",
+    ),
     _option("extrapolate_to", "Continue the spectrum to this wavelength [length],"),
     _option("extrapolate_hurst", "by this Hurst exponent.", type=float),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -173,6 +173,7 @@ class Surface(SelfAffine):
         long_cutoff: Any = None,
         s_filter: Any = None,
         l_filter: Any = None,
+        confirmed: str | Sequence[str] | None = None,
         unit: str | None = None,
         channel: int | None = None,
     ) -> Surface | MeasuredSurface:
@@ -200,7 +201,7 @@ class Surface(SelfAffine):
         extrapolate_to, extrapolate_hurst : float, optional
             Continue the measured spectrum to this wavelength [length] by a power law of
             this Hurst exponent; its influence is recorded.
-        outliers, fill, short_cutoff, long_cutoff, s_filter, l_filter : optional
+        outliers, fill, short_cutoff, long_cutoff, s_filter, l_filter, confirmed : optional
             As in `mbma_tables.surfaces.treatment.Treatment`; the treatment is recorded in
             `provenance`.
         unit : str, optional

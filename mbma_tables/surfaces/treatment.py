@@ -9,13 +9,15 @@ import dataclasses
 import itertools
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray, number_in
 from mbma_tables.common.errors import InputError
+from mbma_tables.surfaces import artefacts
+from mbma_tables.surfaces.artefacts import Artefact
 from mbma_tables.surfaces.measurements import MAX_LENGTH, MIN_LENGTH, heights_of, wrapped
 
 DEGREES = {
@@ -98,6 +100,8 @@ GAUSSIAN = math.log(
     2
 )  # factor in the filter's exponent: wavelengths equal to the nesting index are halved
 LAST_WAVES = 0.01  # amplitude below which wavelengths count as removed by an S-filter
+# what is doubtful about a map unless it is confirmed, by its step in the provenance
+CONFIRMABLE = ("bow", "highest place", "saturation", "seam", "sharp places", "spikes")
 Provenance = tuple[Mapping[str, Any], ...]
 
 
@@ -126,6 +130,10 @@ class Treatment:
         Nesting indices of ISO 25178 [length], of Gaussian filters (ISO 16610-61) that halve
         this wavelength. An S-filter removes shorter ones, completely below 0.39 times the
         index, an L-filter longer ones.
+    confirmed : str or sequence of str, optional
+        What looks like an artefact and was found to be the surface itself: bow, highest place,
+        saturation, seam, sharp places or spikes; of a string the names are separated by
+        commas. Results are then valid in spite of it.
     """
 
     outliers: float | None = None
@@ -135,6 +143,7 @@ class Treatment:
     long_cutoff: float | None = None
     s_filter: float | None = None
     l_filter: float | None = None
+    confirmed: str | Sequence[str] | None = None
 
     def __post_init__(self) -> None:
         for name in ("outliers", *CALLED):
@@ -149,6 +158,24 @@ class Treatment:
                 raise InputError(
                     f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}"
                 )
+        object.__setattr__(self, "confirmed", _names_of(self.confirmed))
+
+
+def _names_of(confirmed: Any) -> tuple[str, ...]:
+    """The names of `Treatment.confirmed`, an InputError for others."""
+    if confirmed is None:
+        return ()
+    names = confirmed.split(",") if isinstance(confirmed, str) else confirmed
+    try:
+        stripped = tuple(name.strip() for name in names)
+    except (TypeError, AttributeError):
+        raise InputError(f"confirmed must be names, got {confirmed!r}") from None
+    for name in stripped:
+        if name not in CONFIRMABLE:
+            raise InputError(
+                f"confirmed must be of {', '.join(CONFIRMABLE)}, got {name!r}"
+            )
+    return stripped
 
 
 # options of `Surface.from_map` and `Surface.from_profile` on reading and treatment
@@ -175,6 +202,7 @@ class Treated:
     provenance: Provenance = ()
     uncut: Any = None  # heights before the short cut-off, where there is one
     form: Any = None  # what detrending removed, if more than a plane
+    confirmed: tuple[str, ...] = ()  # of `Treatment`
 
     @property
     def overlap(self) -> float:
@@ -187,6 +215,20 @@ class Treated:
         return dataclasses.replace(
             self, heights=heights, provenance=(*self.provenance, record)
         )
+
+    def doubted(self, step: str, seen: str, remedy: str, **numbers: Any) -> Treated:
+        """The same heights, with a record of what results are not valid for unless confirmed."""
+        if step in self.confirmed:
+            return self.after(self.heights, step, f"{seen}; this is confirmed", **numbers)
+        own = (
+            f", or confirmed={step!r} if the surface is so" if step in CONFIRMABLE else ""
+        )
+        reason = f"{seen}: {remedy}{own}"
+        return self.after(self.heights, step, seen, **numbers, not_valid=reason)
+
+    def with_artefact(self, found: Artefact) -> Treated:
+        """The same heights, with a record of an artefact."""
+        return self.doubted(found.step, found.seen, found.remedy, points=found.points)
 
     def history(self, *notes: Mapping[str, Any], more: str = "") -> Provenance:
         """All steps of a surface made of it: reading, treatment, its edges, and notes."""
@@ -248,14 +290,18 @@ def treat(
         raise InputError(
             f"{points} points have too few wavelengths; needed are at least {least}"
         )
-    treated = Treated(heights, steps, periodic, unit)
+    confirmed = _names_of(treatment.confirmed)
+    treated = Treated(heights, steps, periodic, unit, confirmed=confirmed)
+    for found in artefacts.as_read(heights) if heights.ndim == 2 else ():
+        treated = treated.with_artefact(found)
     with warnings.catch_warnings():
         # warnings of numpy inside that library are ignored
         warnings.simplefilter("ignore")
         treated = _filled(_without_outliers(treated, treatment.outliers), treatment.fill)
         treated = _without_seams(treated)
         treated = _without_sharp_places(treated, heights)
-        return within(_flattened(treated, treatment.detrend), treatment)
+        treated = _flattened(treated, treatment.detrend)
+        return within(_with_high_place(treated), treatment)
 
 
 def _flattened(treated: Treated, mode: str | None) -> Treated:
@@ -296,7 +342,20 @@ def _flattened(treated: Treated, mode: str | None) -> Treated:
     treated = treated.after(
         flat, "detrend", description, mode=trend, h_rms_before=before, h_rms_after=after
     )
+    # what to subtract was nobody's choice
+    is_default = mode is None and not treated.periodic and flat.ndim == 2
+    bow = artefacts.bow(flat) if is_default else None
+    treated = treated if bow is None else treated.with_artefact(bow)
     return dataclasses.replace(treated, form=removed)
+
+
+def _with_high_place(treated: Treated) -> Treated:
+    """The same heights, with a record of a place on which light contacts hang."""
+    heights = treated.heights
+    if heights.ndim == 1 or any("not_valid" in step for step in treated.provenance):
+        return treated
+    place = artefacts.highest_place(heights, treated.periodic)
+    return treated if place is None else treated.with_artefact(place)
 
 
 def _counted(count: int, size: int) -> str:
@@ -348,14 +407,10 @@ def _without_outliers(treated: Treated, requested_limit: float | None) -> Treate
     )
     if spikes == 0 or heights.ndim == 1:
         return treated.after(heights, "outliers seen", description, points=count)
-    reason = (
-        f"{_counted(spikes, heights.size)} are spikes, on which contact would begin: "
-        f"outliers={limit:g} removes them, as in Surface.from_map(..., "
-        f"outliers={limit:g})"
-    )
-    return treated.after(
-        heights, "outliers seen", description, points=count, not_valid=reason
-    )
+    seen = f"{_counted(spikes, heights.size)} are spikes, on which contact would begin"
+    remedy = f"outliers={limit:g} removes them, as in Surface.from_map(..., outliers={limit:g})"
+    seen_before = treated.after(heights, "outliers seen", description, points=count)
+    return seen_before.doubted("spikes", seen, remedy, points=spikes)
 
 
 def _continued(values: FloatArray, points: int, periodic: bool) -> FloatArray:
@@ -414,18 +469,13 @@ def _without_seams(treated: Treated) -> Treated:
             f"{place + 1}, as where two images were joined at different levels"
         )
         parts = (":, " * axis) + f":{place + 1}", (":, " * axis) + f"{place + 1}:"
-        reason = (
-            f"{description}: give each part as a map of its own, "
+        remedy = (
+            "give each part as a map of its own, "
             f"Surface.from_map(heights[{parts[0]}], ...) and "
             f"Surface.from_map(heights[{parts[1]}], ...)"
         )
-        return treated.after(
-            treated.heights,
-            "seam",
-            description,
-            between=[place, place + 1],
-            axis=axis,
-            not_valid=reason,
+        return treated.doubted(
+            "seam", description, remedy, between=[place, place + 1], axis=axis
         )
     return treated
 
@@ -477,13 +527,11 @@ def _without_sharp_places(treated: Treated, measured: Any) -> Treated:
         f"much more than elsewhere, for instance at heights[{row}, {column}], as "
         "with dust, lost pixels or images joined at different levels"
     )
-    reason = (
-        f"{description}: contact would begin there. {_clean_part(places)}, or measure "
+    remedy = (
+        f"contact would begin there. {_clean_part(places)}, or measure "
         "again, with smaller steps where the surface itself is so steep"
     )
-    return treated.after(
-        treated.heights, "sharp places", description, points=count, not_valid=reason
-    )
+    return treated.doubted("sharp places", description, remedy, points=count)
 
 
 def _tall_places(heights: FloatArray, short: FloatArray, periodic: bool) -> Any:
