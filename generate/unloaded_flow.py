@@ -1,22 +1,24 @@
 """Flow through the gaps of yielded contacts after unloading, by boundary elements, and how well the law describes it."""
 
-import csv
+import dataclasses
 import itertools
 import pathlib
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, cast
 
 import click
 import numpy as np
 import pandas as pd
 
 from generate import files
+from generate.boundary_elements import run as campaigns
 from generate.boundary_elements.solve import load_at, prepared
-from generate.boundary_elements.surfaces import Recipe, heights
+from generate.boundary_elements.surfaces import Recipe, Task, heights
 from generate.page import Cell, table
 from mbma_tables import Bodies, Surface, contact
 from mbma_tables.common import progress
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.files import write_file
 from mbma_tables.contacts.quantities.leakage import OPENING
 from mbma_tables.theories.simulated.boundary_elements import Contact
 from mbma_tables.theories.simulated.reynolds import flow_conductance
@@ -53,57 +55,70 @@ def recipes(
         seed += 1
 
 
-def cases() -> list[tuple[Recipe, float, bool]]:
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """A surface with a hardness, p_m/(E* g)."""
+
+    recipe: Recipe
+    eta: float
+    is_held_out: bool
+
+    @property
+    def name(self) -> str:
+        return f"{self.recipe.name}_eta{self.eta:g}"
+
+
+def cases() -> list[Case]:
     """All surfaces in the order in which they are simulated."""
-    fitted = [(*one, False) for one in recipes(*FITTED, 3001)]
-    held_out = [(*one, True) for one in recipes(*HELD_OUT, 4001)]
+    fitted = [Case(*one, False) for one in recipes(*FITTED, 3001)]
+    held_out = [Case(*one, True) for one in recipes(*HELD_OUT, 4001)]
     both = itertools.zip_longest(fitted, held_out)
     small = [case for pair in both for case in pair if case is not None]
-    return small + [(*one, True) for one in recipes(*LARGE, 5001)]
+    return small + [Case(*one, True) for one in recipes(*LARGE, 5001)]
 
 
-def rows_of(recipe: Recipe, eta: float, is_held_out: bool) -> Iterator[list[str]]:
-    """Rows of one surface, load by load up to its blocking; lengths in h_rms."""
+def solved(case: Any) -> dict[str, FloatArray]:
+    """Columns of one surface, load by load up to its blocking; lengths in h_rms."""
+    recipe, eta = case.recipe, case.eta
     height, _, _ = prepared(heights(recipe), recipe.sizes, recipe.q0)
     h_rms = float(height.std())
     contact = Contact(height, recipe.sizes, hardness=eta)
 
-    def row(found: dict[str, float], gap: FloatArray, *forces: float) -> list[str]:
+    def row(
+        found: dict[str, float], gap: FloatArray, *forces: float
+    ) -> tuple[float, ...]:
         flow = flow_conductance(gap / h_rms, recipe.sizes)
-        given = (recipe.hurst, recipe.zeta_1, recipe.waves, recipe.seed, is_held_out)
+        given = (recipe.hurst, recipe.zeta_1, recipe.waves, recipe.seed)
         u = found["mean_separation"] / h_rms
-        solved = found["area"], found["area_yielded"], u, *flow
-        return [f"{number:.6g}" for number in (*given, eta, *forces, *solved)]
+        contact_of = found["area"], found["area_yielded"], u
+        return (*given, case.is_held_out, eta, *forces, *contact_of, *map(float, flow))
 
+    rows = list[tuple[float, ...]]()
     for area in AREAS:
         force = load_at(area, eta)
         loaded = row(contact.press(force), contact.gap, force, force)
-        yield loaded
+        rows.append(loaded)
         if area in UNLOADED:
             after = contact.unloading()
             for share in SHARES:
                 found = after.press(share * force) | {"area_yielded": 0.0}
                 # lengths as those of the map before
-                yield row(found, after.gap, force, share * force)
-        if loaded[-2:] == ["0", "0"]:
-            return
+                rows.append(row(found, after.gap, force, share * force))
+        if not any(loaded[-2:]):
+            break
+    values = np.array(rows, dtype=float)
+    return {name: values[:, k] for k, name in enumerate(COLUMNS)}
 
 
-def simulate(path: pathlib.Path) -> None:
-    """Simulate the surfaces that a file lacks; rows are added to it surface by surface."""
-    done = set()
-    if path.is_file():
-        with open(path, newline="") as stream:
-            done = {row["seed"] for row in csv.DictReader(stream)}
-    else:
-        path.write_text(",".join(COLUMNS) + "\n")
-    for number, (recipe, eta, is_held_out) in enumerate(cases(), 1):
-        if str(recipe.seed) in done:
-            continue
-        progress.doing(f"surface {number} of {len(cases())}")
-        rows = [",".join(row) for row in rows_of(recipe, eta, is_held_out)]
-        with open(path, "a") as stream:
-            stream.write("\n".join(rows) + "\n")
+def gathered(folder: pathlib.Path) -> pd.DataFrame:
+    """Rows of the surfaces that are solved."""
+    frames = []
+    for case in cases():
+        path = folder / f"{case.name}.npz"
+        if path.exists():
+            with np.load(path, allow_pickle=False) as content:
+                frames.append(pd.DataFrame(dict(content)))
+    return pd.concat(frames, ignore_index=True)[list(COLUMNS)]
 
 
 def openings(rows: pd.DataFrame) -> pd.DataFrame:
@@ -167,7 +182,17 @@ def accuracy(found: pd.DataFrame) -> str:
 
 
 @click.command()
-@click.option("--simulate", "is_simulated", is_flag=True, help="Add missing surfaces.")
+@click.option("--simulate", "is_simulated", is_flag=True, help="Solve missing surfaces.")
+@click.option(
+    "--folder",
+    type=click.Path(path_type=pathlib.Path),
+    default="unloaded_flow",
+    show_default=True,
+    help="One file a surface.",
+)
+@click.option(
+    "--collect", is_flag=True, help="Write what there is into docs/data, no runs."
+)
 @click.option(
     "--data",
     "path",
@@ -175,11 +200,22 @@ def accuracy(found: pd.DataFrame) -> str:
     default=FILE,
     help="File of rows.",
 )
-def unloaded_flow(is_simulated: bool, path: pathlib.Path) -> None:
-    """How flow grows as yielded contacts are unloaded, and the law beside simulations that it was not fitted to."""
+def unloaded_flow(
+    is_simulated: bool, folder: pathlib.Path, collect: bool, path: pathlib.Path
+) -> None:
+    """How flow grows as yielded contacts are unloaded, and the law beside simulations that it was not fitted to.
+
+    Simulations that are stopped and called again go on where they were.
+    """
     if is_simulated:
-        with progress.shown("surfaces"):
-            simulate(path)
+        tasks = [Task(cast(Recipe, case), "") for case in cases()]
+        campaigns.run(tasks, folder, 1, solved)
+        return
+    if collect:
+        rows = gathered(folder)
+        write_file(path, files.to_csv("", rows, "%.6g"))
+        progress.echo(f"{path}: {len(rows)} contacts")
+        return
     rows = pd.read_csv(path)
     found = openings(rows)
     fitted = found[(found.held_out == 0) & (found.area_0 < EDGES[-1])]
