@@ -26,7 +26,6 @@ from mbma_tables.contacts.question import GAPS, Question, both_separations
 from mbma_tables.contacts.result import Contact, Setup
 from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
 from mbma_tables.theories import resolve
-from mbma_tables.theories.adhesion import with_adhesion
 from mbma_tables.theories.base import (
     Gaps,
     Solved,
@@ -34,7 +33,6 @@ from mbma_tables.theories.base import (
     UserTheory,
     require_domain,
 )
-from mbma_tables.theories.hardness import with_hardness
 
 # what a theory gives at once; the other quantities follow
 ANSWERED = ("separation", "mean_separation", "pressure", "area", "error")
@@ -195,11 +193,7 @@ def _solved(
     if np.shape(question.value) != shape:
         question = Question(question.name, np.broadcast_to(question.value, shape))
     modulus = spread(modulus, shape)
-    theory = setup.theory
-    if bodies.yields:
-        theory = with_hardness(theory, cap, modulus, bodies.largest)
-    elif bodies.adhesion is not None:
-        theory = with_adhesion(theory, bodies.adhesion, modulus)
+    theory = setup.theory_of(bodies)
     gaps = _separations(setup, theory, surface, question, modulus, cap)
     return theory.solved(surface, gaps, modulus), gaps
 

@@ -79,22 +79,31 @@ class Setup:
     bodies: BodiesInUnits
     theory: Theory
     interface: Interface = NOTHING_BETWEEN
+    # the theory of these bodies, once it is made
+    _made: list[Theory] = dataclasses.field(default_factory=list, init=False, repr=False)
 
     def theory_of(self, bodies: BodiesInUnits) -> Theory:
-        """The theory, with the bodies' hardness or adhesion where they have one."""
-        if bodies.adhesion is not None:
-            return with_adhesion(self.theory, bodies.adhesion, bodies.E_star)
-        if not self.bodies.yields:
-            return self.theory
-        broadcast_shape(**bodies.numbers)
-        hardness = checked_hardness(bodies.hardness)
-        return with_hardness(self.theory, hardness, bodies.E_star, bodies.largest)
+        """The theory, with the bodies' hardness or adhesion where they have one.
 
-    @functools.cached_property
-    def whole_theory(self) -> Theory:
-        """The theory of all entries, which keeps what it found of the surface."""
-        numbers = map(np.asarray, self.bodies.numbers.values())
-        return self.theory_of(self.bodies.at(*numbers))
+        That of the setup's own bodies is made once, with what it keeps for a surface.
+        """
+        if not self.bodies.yields and bodies.adhesion is None:
+            return self.theory
+        is_own = bodies is self.bodies
+        if is_own and self._made:
+            return self._made[0]
+        if not is_own:
+            broadcast_shape(**bodies.numbers)
+            checked_hardness(bodies.hardness)
+        made: Theory
+        if bodies.adhesion is not None:
+            made = with_adhesion(self.theory, bodies.adhesion, bodies.E_star)
+        else:
+            hardness, largest = bodies.hardness, bodies.largest
+            made = with_hardness(self.theory, hardness, bodies.E_star, largest)
+        if is_own:
+            self._made.append(made)
+        return made
 
 
 class Contact(State, Displayed):
@@ -274,9 +283,9 @@ class Contact(State, Displayed):
             )
             return labelled
         broadcast_shape(surface=self.surface.h_rms, **arrays)
-        gap, *others = map(np.asarray, arrays.values())
-        theory = self._setup.whole_theory
-        found = function(theory, self.surface, gap, others[0], *others[count:])
+        u, modulus, *others = map(np.asarray, arrays.values())
+        theory = self.theory_of(bodies)
+        found = function(theory, self.surface, u, modulus, *others[count - 1 :])
         return tuple(part[()] for part in found)
 
     @property
@@ -343,20 +352,19 @@ class Contact(State, Displayed):
 
     def unloading(self) -> Contact:
         """The contact as it unloads from here, with its own pressure as the largest so far if it is."""
-        return self._unloading
+        return self._unloading if self.yields else self
 
     @functools.cached_property
     def _unloading(self) -> Contact:
-        if not self.yields:
-            return self
-        largest = self.pressure
-        if self.bodies.largest is not None:
-            largest = np.maximum(largest, self.bodies.largest)
-        bodies = dataclasses.replace(self.bodies, largest=largest)
-        setup = dataclasses.replace(self._setup, bodies=bodies)
+        setup, before, largest = self._setup, self.bodies.largest, self.pressure
+        if before is not None:
+            largest = np.maximum(largest, before)
+        if before is None or is_labelled(largest) or np.any(largest != before):
+            bodies = dataclasses.replace(self.bodies, largest=largest)
+            setup = dataclasses.replace(setup, bodies=bodies)
         # of the theory, also where this is a contact of a law
         near = Contact(setup, {"mean_separation": self.mean_separation})
-        return Contact(setup, {"mean_separation": near.separation_at(self.pressure)})
+        return near._moved(near.separation_at(self.pressure))
 
     @functools.cached_property
     def leakage(self) -> Leakage:

@@ -38,7 +38,8 @@ def reasons_with_masks(
     bodies = contact.bodies
     own = bodies.numbers.values()
     fields = [contact.mean_separation, *own, *more.values()]
-    if any_labelled(surface, *fields):
+    is_labelled = any_labelled(surface, *fields)
+    if is_labelled:
         import xarray as xr
 
         numbers_of_surface = list(surface.numbers().values())
@@ -48,8 +49,9 @@ def reasons_with_masks(
         if numbers_of_surface:
             surface = surface.with_numbers(*plain[len(fields) :])
     u, *others = map(np.asarray, fields)
-    one = bodies.at(*others[: len(own)])
-    masks = reasons(contact.theory_of(one), surface, u, one.E_star, *others[len(own) :])
+    one = bodies.at(*others[: len(own)]) if is_labelled else bodies
+    theory = contact.theory_of(one)
+    masks = reasons(theory, surface, u, np.asarray(one.E_star), *others[len(own) :])
     return {reason: mask for reason, mask in masks.items() if mask.any()}
 
 

@@ -259,17 +259,14 @@ class Yielding(Theory):
 
     def _closed(self, surface: AnySurface) -> Any:
         """p_m/(E* g), and the force over A0 E* and its -d/du between the elastic ones and the bearing curve."""
-        if self._bound[0] is not surface:
+        # one assignment, as threads share a contact
+        bound = self._bound
+        if bound[0] is not surface:
             eta = self._eta(surface)
             sizes = np.asarray(surface.h_rms), np.asarray(surface.rms_gradient), eta
-            self._bound = (
-                surface,
-                (
-                    eta,
-                    functools.partial(law.closed, self.elastic.heights(surface), *sizes),
-                ),
-            )
-        return self._bound[1]
+            closed = functools.partial(law.closed, self.elastic.heights(surface), *sizes)
+            self._bound = bound = surface, (eta, closed)
+        return bound[1]
 
     def interval(
         self, surface: AnySurface, quantity: str = "pressure"

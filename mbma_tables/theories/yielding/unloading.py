@@ -23,9 +23,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize.elementwise import find_root
 from scipy.special import beta, betainc
 
-from mbma_tables.common.arguments import FloatArray, require
+from mbma_tables.common.arguments import FloatArray, require, rows
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.theories import inversion
 from mbma_tables.theories.base import (
     Gaps,
     Solved,
@@ -33,7 +34,9 @@ from mbma_tables.theories.base import (
     TheoryAnswer,
     select,
     solved_by,
+    unfinished,
 )
+from mbma_tables.theories.inversion import Curve, Indices
 from mbma_tables.theories.yielding.theory import Yielding
 
 # pressure over the largest, below which force is a power of the distance to last contact:
@@ -68,7 +71,6 @@ SOFTEST = (
     0.033  # hardness over E* times the rms gradient, of the softest that was unloaded
 )
 ROUNDING = 1e-9
-HALVINGS = 50
 
 
 def ratio_scatter(quantity: str, s: FloatArray, yielded: FloatArray) -> FloatArray:
@@ -170,6 +172,8 @@ class Peak(NamedTuple):
 
     def at(self, shape: tuple[int, ...], place: Any) -> Peak:
         """The entries at flat indices of a broadcast shape."""
+        if np.size(self.mean_separation) == 1:
+            return self
 
         def chosen(value: Any) -> Any:
             if isinstance(value, tuple):
@@ -187,13 +191,27 @@ class Peak(NamedTuple):
         elastic = (1 - weight) * moved * self.elastic.stiffness
         return np.asarray(self.mean_separation + (elastic + flat) / self.stiffness)
 
+    def distances(self, last: FloatArray, elastic: Curve) -> Curve:
+        """Distance from the branch to last contact at `last`, by the elastic separation, of whose force the curve is."""
+        weight, *powers = self.spots
+
+        def values(v: FloatArray) -> tuple[FloatArray, FloatArray, bool]:
+            force, steepness, exact = elastic(v)
+            s = np.minimum(force / self.pressure, 1.0)
+            flat = weight * steepness / flattened(s, *powers)
+            rate = (1 - weight) * self.elastic.stiffness + flat
+            return last - self.separation(v, s), rate / self.stiffness, exact
+
+        return values
+
 
 class Tail(NamedTuple):
     """The lightest contacts, of which force and area are one power of the distance to last contact."""
 
     first: FloatArray  # mean separation where they begin,
     elastic_separation: FloatArray  # that of the elastic contact at the same force,
-    last: FloatArray  # and where contact ends
+    last: FloatArray  # and where contact ends,
+    elastic_last: FloatArray  # that of the elastic contact
     pressure: FloatArray  # over A0 E*, at `first`
     area: FloatArray
     power: FloatArray
@@ -270,10 +288,12 @@ class Unloading(Theory):
         return found
 
     def _curve(self, surface: AnySurface) -> tuple[Peak, Tail]:
-        if self._bound[0] is not surface:
+        # one assignment, as threads share a contact
+        bound = self._bound
+        if bound[0] is not surface:
             peak = self._peak(surface)
-            self._bound = surface, peak, self._tail(surface, peak)
-        return self._bound[1], self._bound[2]
+            self._bound = bound = surface, peak, self._tail(surface, peak)
+        return bound[1], bound[2]
 
     def weights(self, yielded: FloatArray, area: FloatArray) -> tuple[Any, Any]:
         """w, a and b of the stiffness and of the area."""
@@ -311,13 +331,13 @@ class Unloading(Theory):
         pressure = LEAST * peak.pressure
         v = elastic.mean_separation_at(surface, "pressure", pressure)
         first = peak.separation(v, np.asarray(LEAST))
-        last = first
+        last, end = first, v
         if self.ends_at_h_max:
-            end = elastic.highest(surface)
+            end = np.broadcast_to(elastic.highest(surface), np.shape(v))
             last = peak.separation(end, np.asarray(0.0))
         branch = self._branch(surface, peak, v, first).answer
         power = np.where(last > first, branch.stiffness * (last - first) / pressure, 1.0)
-        return Tail(first, v, last, branch.pressure, branch.area, power)
+        return Tail(first, v, last, end, branch.pressure, branch.area, power)
 
     def highest(self, surface: AnySurface) -> FloatArray:
         """Mean separation of first contact with the residual shape [length]."""
@@ -376,9 +396,14 @@ class Unloading(Theory):
         below = peak.remembered & (u >= peak.mean_separation)
         deepest = np.where(below, peak.mean_separation, u)
         first = self.loading.loaded(surface, deepest)
+        if not below.any():
+            return self._joined(below, first, first)
         v = self._elastic_separation(surface, u) if lighter is None else lighter
         branch = self._branch(surface, peak, np.maximum(v, peak.elastic_separation), u)
-        branch = self._light(surface, branch, u)
+        return self._joined(below, self._light(surface, branch, u), first)
+
+    def _joined(self, below: Any, branch: Any, first: Any) -> Unloaded:
+        """Contacts of the branch where they are below it, else of first loading."""
         fields = [
             np.where(below, one, other)
             for one, other in zip(branch.answer, first.answer, strict=True)
@@ -435,32 +460,31 @@ class Unloading(Theory):
             unloading_stiffness=answer.stiffness,
         )
 
+    @np.errstate(all="ignore")
     def _elastic_separation(self, surface: AnySurface, u: FloatArray) -> FloatArray:
         """Mean separations of the elastic contact at the forces of contacts at u, but the lightest."""
         peak, tail = self._curve(surface)
-        shape = np.broadcast_shapes(u.shape, np.shape(tail.first))
-        low = np.broadcast_to(peak.elastic_separation, shape)
-        high = np.broadcast_to(tail.elastic_separation, shape)
-        wanted = np.broadcast_to(
-            np.where(peak.remembered, u, peak.mean_separation), shape
-        )
+        inside = peak.remembered & (u > peak.mean_separation) & (u < tail.first)
+        low, end = peak.elastic_separation, tail.elastic_last
+        given = tail.last - u, inside, low, end, tail.last
+        (goal, is_wanted, lows, ends, last), shape = rows(*given)
+        force = self.branch_theory.curve(surface, "pressure")
+        count = self.looks if np.size(low) == 1 else self.looks_of_batch
+        whole = peak.distances(tail.last, force)
+        samples, exact = inversion.sampled(whole, low, end, count, shape)
 
-        def missed(v: FloatArray, place: FloatArray) -> FloatArray:
-            chosen = place.astype(np.intp)
-            part = self.branch_theory.at(shape, chosen)
-            own_peak = peak.at(shape, chosen)
-            force = part.answer(select(surface, shape, chosen), v).pressure
-            s = np.minimum(force / own_peak.pressure, 1.0)
-            return np.asarray(own_peak.separation(v, s) - wanted.ravel()[chosen])
+        def curve_of(places: Indices) -> Curve:
+            theory = self.branch_theory.at(shape, places)
+            curve = theory.curve(select(surface, shape, places), "pressure")
+            chosen = np.asarray(places).astype(np.intp)
+            return peak.at(shape, chosen).distances(last[chosen], curve)
 
-        place = np.arange(float(wanted.size)).reshape(shape)
-        inside = (wanted > peak.mean_separation) & (wanted < tail.first)
-        bracket = low, np.where(inside, high, low)
-        found = find_root(missed, bracket, args=(place,)).x
-        # without a bracket contacts are within rounding of an end
-        is_light = tail.first - wanted < wanted - peak.mean_separation
-        ends = np.where(is_light, high, low)
-        return np.where(inside & ~np.isnan(found), found, ends)
+        search = inversion.Search(samples, exact, goal, ends, lows, ends)
+        missed = search.run(curve_of, is_wanted > 0)
+        if missed.any():
+            raise unfinished(missed.reshape(shape), "the elastic contact of a branch")
+        beyond = np.where(u < tail.first, low, tail.elastic_separation)
+        return np.where(inside, search.gap.reshape(shape), beyond)
 
     def at_force(
         self, surface: AnySurface, pressure: FloatArray
@@ -520,17 +544,22 @@ class Unloading(Theory):
 
     def _pressure_ratio(self, peak: Peak, area: FloatArray) -> FloatArray:
         """p/p0 at contact areas, as for an elastic area in proportion to the pressure."""
-        weight, *powers = peak.area_spots
-        low = np.full(area.shape, np.log(FRACTIONS[0]))
-        high = np.zeros(area.shape)
-        for _ in range(HALVINGS):
-            middle = (low + high) / 2
-            s = np.exp(middle)
-            larger = (
-                s ** (1 - weight) * flattened(s, *powers) ** weight > area / peak.area
-            )
-            low, high = np.where(larger, low, middle), np.where(larger, middle, high)
-        return np.asarray(np.exp(low))
+        log_least = np.log(np.asarray(FRACTIONS[0]))
+        with np.errstate(divide="ignore"):
+            log_area = np.log(area / peak.area)
+
+        def missed(
+            log_s: FloatArray, wanted: FloatArray, weight: FloatArray, *powers: Any
+        ) -> FloatArray:
+            log_flat = np.log(flattened(np.exp(log_s), *powers))
+            return np.asarray((1 - weight) * log_s + weight * log_flat - wanted)
+
+        given = np.broadcast_arrays(log_area, *peak.area_spots)
+        # those of lighter contacts count as those of the lightest
+        least = missed(log_least, np.zeros(()), *given[1:])
+        wanted = np.maximum(given[0], least)
+        found = find_root(missed, (log_least, 0.0), args=(wanted, *given[1:])).x
+        return np.asarray(np.exp(np.where(np.isnan(found), log_least, found)))
 
     @np.errstate(divide="ignore", invalid="ignore")
     def _pressure_scatter(

@@ -167,6 +167,32 @@ def test_largest_pressures_broadcast_with_all_else():
     assert bool(labelled.valid.all())
 
 
+@pytest.mark.parametrize("theory", ["calibrated", "mbma"])
+def test_the_contact_under_the_largest_pressure_is_solved_once(theory, monkeypatch):
+    solved = []
+    peak = law.Unloading._peak
+
+    def counted(self, surface):
+        solved.append(np.shape(self.largest))
+        return peak(self, surface)
+
+    monkeypatch.setattr(law.Unloading, "_peak", counted)
+    names = ("area", "yielded", "energy", "valid", "scatter", "stiffness_scatter")
+    pressed = unloaded(PRESSURES, theory)
+    after = [pressed.quantity(name) for name in names]
+    sheared = pressed.tangential(friction=0.2)
+    assert sheared.energy_loss(0.1 * pressed.pressure).all()
+    assert pressed.leakage.K.all()
+    assert solved == [()]
+    # in first loading each pressure is the largest of the branch that begins there
+    solved.clear()
+    first = contact(FACE, BODIES, pressure=PRESSURES, theory=theory)
+    before = [first.quantity(name) for name in names]
+    assert first.tangential(friction=0.2).energy_loss(0.1 * first.pressure).all()
+    assert solved == [(len(PRESSURES),)]
+    assert all(np.isfinite(value).all() for value in (*after, *before[:4]))
+
+
 @pytest.mark.parametrize("theory", ["calibrated", "mbma", "persson"])
 def test_a_law_of_unloading_is_the_contacts(theory):
     one = contact_law(FACE, BODIES, theory, largest_pressure=LARGEST)
@@ -247,6 +273,21 @@ def test_the_law_holds_for_the_boundary_elements():
         assert 0.6 < np.mean(ratio < 1) < 0.95
         assert np.mean(ratio < 2) > 0.92
         assert np.sqrt(np.mean(missed[name][yields] ** 2)) < goal
+
+
+@pytest.mark.parametrize("theory", ["calibrated", "persson"])
+def test_stated_scatter_is_at_the_pressure_of_a_contact_area(theory):
+    """The branch is A/A0 = s^(1-w) [1 - (1-s)^a]^(w b), whose pressure the scatter looks up by its area."""
+    pressed = unloaded(theory=theory, pressure=["1 MPa", "10 MPa", "50 MPa", "99 MPa"])
+    engine = pressed.theory_of(pressed.bodies)
+    peak = engine.peak(FACE)
+    weight, *powers = peak.area_spots
+    s = np.array([0.01, 0.0101, 0.2, 0.9, 0.999999, 1.0])
+    share = s ** (1 - weight) * law.flattened(s, *powers) ** weight
+    found = engine._pressure_ratio(peak, peak.area * share)
+    np.testing.assert_allclose(found, s, rtol=1e-9)
+    # without contact the scatter of the lightest counts
+    assert engine._pressure_ratio(peak, np.array(0.0)) == pytest.approx(0.01)
 
 
 def test_unloading_is_that_of_another_program():
