@@ -471,7 +471,9 @@ class Unloading(Theory):
         force = self.branch_theory.curve(surface, "pressure")
         count = self.looks if np.size(low) == 1 else self.looks_of_batch
         whole = peak.distances(tail.last, force)
-        samples, exact = inversion.sampled(whole, low, end, count, shape)
+        shares = inversion.shares(count).reshape(-1, *[1] * len(shape))
+        looks = np.asarray(low + (tail.elastic_last - low) * shares)
+        samples, exact = inversion.sampled(whole, looks, shape)
 
         def curve_of(places: Indices) -> Curve:
             theory = self.branch_theory.at(shape, places)
