@@ -192,7 +192,8 @@ def _solved(
     )
     if np.shape(question.value) != shape:
         question = Question(question.name, np.broadcast_to(question.value, shape))
-    modulus = spread(modulus, shape)
+    if modulus.shape != shape:
+        modulus = spread(modulus, shape)
     theory = setup.theory_of(bodies)
     gaps = _separations(setup, theory, surface, question, modulus, cap)
     return theory.solved(surface, gaps, modulus), gaps
