@@ -31,6 +31,10 @@ ROLLED_OFF = (
     0.5  # which have no roll-off if they have more than this share of the variance
 )
 MIN_NODES = 5
+# of a spectrum that is given: how far beyond its last wavenumber it is continued, and the
+# independent samples of each entry
+CONTINUED = 10.0
+AVERAGED = 1e4
 ONE_TRACE = (
     "traces cannot tell heights and gradient of a surface as well as the stated scatter: "
     "measure a map, Surface.from_map(map)"
@@ -396,14 +400,14 @@ def _isotropic(
     mean: FloatArray,
     count: FloatArray,
     kernel: FloatArray,
-    squares: tuple[float, float],
+    squares: Sequence[float],
     near: FloatArray | None,
 ) -> FloatArray:
     """C at the edges of bins [length^4], h_rms^2 = 2 pi integral C q dq.
 
     `fine` are the ends of panels, `mean` is C_1D of each bin, `count` its independent
     components, `kernel` its C_1D for C = 1 on each panel, `squares` are the mean squares of
-    height and gradient.
+    height and gradient where they are known, `near` is a C to start from.
     """
     from scipy.optimize import least_squares
     from scipy.special import digamma
@@ -417,8 +421,9 @@ def _isotropic(
     # the logarithm of a mean of few samples is biased low
     log_mean = np.log(mean) - digamma(independent) + np.log(independent)
     # height variance and squared gradient for C = 1 on each panel
-    sums = np.stack([np.pi * np.diff(fine**2), np.pi / 2 * np.diff(fine**4)])
-    log_squares = np.log(squares)
+    every = [np.pi * np.diff(fine**2), np.pi / 2 * np.diff(fine**4)]
+    sums = np.stack(every)[: len(squares)]
+    log_squares = np.log(np.asarray(squares, float))
     # height variance and gradient weigh so much more that they are met to 1e-5
     exact = 1e3
     between = _interpolation(log_q, fine)
@@ -436,14 +441,46 @@ def _isotropic(
         of_squares = (sums * C) @ between / (sums @ C)[:, None]
         return np.vstack([weight[:, None] * of_trace, bend, exact * of_squares])
 
-    # of the right size to start from: C_1D/(2 pi q)
-    middles = np.sqrt(edges[1:] * edges[:-1])[has_power]
-    log_start = np.log(mean[has_power] / (2 * np.pi * middles))
-    start = np.interp(log_q, np.log(middles), log_start)
-    if near is not None:
+    if near is None:
+        # of the right size to start from: C_1D/(2 pi q)
+        middles = np.sqrt(edges[1:] * edges[:-1])[has_power]
+        log_start = np.log(mean[has_power] / (2 * np.pi * middles))
+        start = np.interp(log_q, np.log(middles), log_start)
+    else:
         start = np.log(near)
     fitted = least_squares(deviations, start, jac=jacobian)
     return np.asarray(np.exp(fitted.x))
+
+
+def isotropic_spectrum(q: FloatArray, C_1D: FloatArray) -> FloatArray:
+    """C [length^4] at wavenumbers of the surface whose traces have a spectrum C_1D there.
+
+    Beyond the last one C is continued.
+    """
+    if q.size < MIN_NODES + 1:
+        raise InputError(
+            f"a spectrum of traces of {q.size} wavenumbers: needed are at least "
+            f"{MIN_NODES + 1}"
+        )
+    # lengths of order one, so that powers neither underflow nor overflow
+    x = q / q[0]
+    values = C_1D / C_1D[0]
+    end = CONTINUED * x[-1]
+    count = max(MIN_NODES, math.ceil(PER_DECADE * math.log10(end)))
+    edges = np.geomspace(1.0, end, count + 1)
+    fine = _fine(edges)
+    kernel = _panel_sums(fine, x, np.ones(x.size), np.arange(x.size))
+    log_x = np.log(x)
+    last = max(math.log(x[-1]) - math.log(10) / 2, 0.0)
+    (steep,) = np.diff(np.interp([last, log_x[-1]], log_x, np.log(values)))
+    steep = min(steep / (log_x[-1] - last), 0.0)
+    beyond = np.maximum(np.log(edges) - log_x[-1], 0.0)
+    log_start = np.interp(np.log(edges), log_x, np.log(values)) + steep * beyond
+    start = np.exp(log_start) / (2 * np.pi * edges)
+    samples = np.full(x.size, AVERAGED)
+    nodes = _isotropic(edges, fine, values, samples, kernel, (), start)
+    C = np.exp(np.interp(log_x, np.log(edges), np.log(nodes)))
+    return np.asarray(C * C_1D[0] / q[0])
 
 
 def _interpolation(log_q: FloatArray, fine: FloatArray) -> FloatArray:

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import finite_array, hinted, require_flag
+from mbma_tables.common.arguments import (
+    FloatArray,
+    finite_array,
+    hinted,
+    require_flag,
+    require_name,
+)
 from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.roughness import ASSUMED
@@ -22,6 +27,10 @@ UNNAMED = (
     "the convention of the spectrum is not named: give Surface.from_spectrum(..., "
     "convention='paper') if h_rms^2 is 2 pi integral C q dq, or convention='isotropic' "
     "if it is integral C q dq/(2 pi), as of most programs"
+)
+TRACES = (
+    "the spectrum is of traces: isotropy is assumed and the sampling error is not known; "
+    "Surface.from_profile([trace, ...], across=[...]) takes the traces"
 )
 
 
@@ -97,11 +106,12 @@ class Surface(SelfAffine):
         heights : array_like, optional
             Heights measured anywhere on the surface [length], of any shape; their mean is
             subtracted. Default: a Gaussian distribution that ends at h_max.
-        convention : {"paper", "isotropic"}, optional
+        convention : {"paper", "isotropic", "C1D", "C1D+"}, optional
             h_rms^2 = 2 pi integral C q dq (Eqs. 4-6), or = integral C q dq / (2 pi). If it
-            is not named, that of the paper is taken, and results are not `valid`. The
-            one-dimensional spectrum of a trace [length^3] is neither: `from_profile` takes
-            the trace.
+            is not named, that of the paper is taken, and results are not `valid`. Spectra
+            of traces [length^3] are "C1D", h_rms^2 = integral C dq / pi, or "C1D+",
+            h_rms^2 = integral C dq / (2 pi); they are positive, of at least six
+            wavenumbers, and results are not `valid`: `from_profile` takes the traces.
         model : {"measured", "self-affine"}, optional
             The spectrum itself, or the five numbers of its `MeasuredSurface.fit(band)`.
         band : tuple of float, optional
@@ -127,27 +137,28 @@ class Surface(SelfAffine):
         >>> print(f"alpha = {surface.alpha:.1f}")
         alpha = 106.5
         """
-        if convention not in (None, "paper", "isotropic"):
-            raise InputError(
-                "convention must be 'paper' or 'isotropic' (of a trace, give the trace "
-                f"to Surface.from_profile), got {convention!r}"
-            )
+        from mbma_tables.surfaces.conventions import CONVENTIONS, OVER_C1D
+
+        if convention is not None:
+            require_name("convention", convention, CONVENTIONS)
         if np.ma.is_masked(C) and np.shape(q) == np.shape(C):
             shown = ~np.ma.getmaskarray(np.ma.asanyarray(C))
             q = np.asarray(q)[shown]
             C = np.asarray(C)[shown]
         distribution = None if heights is None else Heights.of(heights)
-        C_of_paper = finite_array("C", C) * (
-            1 / (4 * math.pi**2) if convention == "isotropic" else 1.0
-        )
-        unnamed = () if convention else ({"step": "convention", "not_valid": UNNAMED},)
+        q, C_of_paper = _of_paper(q, C, convention)
+        records: tuple[Mapping[str, Any], ...] = ()
+        if convention is None:
+            records = ({"step": "convention", "not_valid": UNNAMED},)
+        elif convention in OVER_C1D:
+            records = ({"step": "convention", "not_valid": TRACES},)
         surface = MeasuredSurface(
             q,
             C_of_paper,
             h_max,
             distribution,
             unit=unit,
-            provenance=unnamed,
+            provenance=records,
             nominal_area=nominal_area,
         )
         return _modelled(surface, model, band)
@@ -390,6 +401,24 @@ class MeasuredSurface(SpectralSurface):
         return Surface(
             **numbers, h_max=self.h_max, unit=self.unit, provenance=self.provenance
         )
+
+
+def _of_paper(q: Any, C: Any, convention: str | None) -> tuple[Any, FloatArray]:
+    """q and C by the paper's convention [length^4]."""
+    from mbma_tables.surfaces.conventions import OVER_PAPER, converted
+
+    values = finite_array("C", C)
+    if convention is None or convention in OVER_PAPER:
+        return q, values / OVER_PAPER[convention or "paper"]
+    wavenumber = finite_array("q", q)
+    if wavenumber.ndim != 1 or wavenumber.shape != values.shape:
+        raise InputError(
+            "q and C must be two columns of one length, got shapes "
+            f"{wavenumber.shape} and {values.shape}"
+        )
+    order = np.argsort(wavenumber, kind="stable")
+    rising = wavenumber[order]
+    return rising, converted(rising, values[order], convention, "paper")
 
 
 def assumptions(surface: Any) -> list[str]:

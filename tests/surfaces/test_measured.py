@@ -138,7 +138,7 @@ class TestMeasuredSurface:
             ([1.0, 9.0, 99.0], [1.0, 0.0, 1.0], {"h_max": 1.0}, "holds no height"),
             (Q, C, {"h_max": -1.0}, "h_max must be positive"),
             (Q, C, {"heights": np.ones(9)}, "heights are all the same"),
-            (Q, C, {"h_max": 1.0, "convention": "profile"}, "convention must be"),
+            (Q, C, {"h_max": 1.0, "convention": "profile"}, "no convention is named"),
         )
     )
 
