@@ -46,33 +46,25 @@ static mbma_axis *axes_of(const double *numbers, size_t axes) {
     return found;
 }
 
-/* Coefficients with zeros behind the terms of the last axis up to a multiple of MBMA_LANES, and where cells start. */
-static bool pad(mbma_cell_table *t, const double *packed, size_t count) {
+/* Where the coefficients of each cell start, those of one cell after the other. */
+static bool fill_starts(mbma_cell_table *t, size_t count) {
     int64_t *starts = malloc(t->cells * sizeof *starts);
-    double *padded = calloc(count * MBMA_LANES, sizeof *padded);
-    t->starts = starts, t->coefficients = padded;
-    if (!starts || !padded)
-        return false;
-    size_t from = 0, to = 0;
-    for (size_t cell = 0; cell < t->cells; cell++) {
-        const int32_t *terms = t->terms + cell * t->axes;
-        size_t rows = t->outputs;
+    t->starts = starts, t->coefficient_count = count;
+    size_t start = 0;
+    for (size_t cell = 0; starts && cell < t->cells; cell++) {
+        size_t size = t->outputs;
         for (size_t a = 0; a < t->axes; a++) {
-            if (terms[a] < 1 || terms[a] > MBMA_MAX_TERMS)
+            const int32_t terms = t->terms[cell * t->axes + a];
+            if (terms < 1 || terms > MBMA_MAX_TERMS)
                 return false;
-            rows *= a + 1 < t->axes ? (size_t)terms[a] : 1;
+            size *= (size_t)terms;
         }
-        const size_t last = (size_t)terms[t->axes - 1];
-        if (rows * last > count - from)
+        if (size > count - start)
             return false;
-        starts[cell] = (int64_t)to;
-        for (size_t row = 0; row < rows; row++, from += last) {
-            memcpy(padded + to, packed + from, last * sizeof *padded);
-            to += (last + MBMA_LANES - 1) / MBMA_LANES * MBMA_LANES;
-        }
+        starts[cell] = (int64_t)start;
+        start += size;
     }
-    t->coefficient_count = to;
-    return from == count;
+    return starts && start == count;
 }
 
 enum { AXES, OUTPUTS, BRANCHES, MIDDLES, TERMS, COEFFICIENTS, ERRORS, POINTS, EXACT, VARIABLES };
@@ -99,6 +91,7 @@ static bool fill(read_table *table, double **v, const size_t *rows, const size_t
                                      .branches = whole(v[BRANCHES], count[BRANCHES]),
                                      .terms = whole(v[TERMS], count[TERMS]),
                                      .middles = v[MIDDLES],
+                                     .coefficients = v[COEFFICIENTS],
                                      .errors = v[ERRORS]};
     table->output_numbers = v[OUTPUTS];
     table->points = rows[POINTS];
@@ -108,7 +101,7 @@ static bool fill(read_table *table, double **v, const size_t *rows, const size_t
         return false;
     for (size_t f = 0; f < t->outputs; f++)
         exponential[f] = v[OUTPUTS][3 * f] > 0.0;
-    return pad(t, v[COEFFICIENTS], count[COEFFICIENTS]);
+    return fill_starts(t, count[COEFFICIENTS]);
 }
 
 const char *read_table_open(const char *path, read_table *table) {
@@ -124,7 +117,7 @@ const char *read_table_open(const char *path, read_table *table) {
     nc_close(file);
     if (good && fit_together(rows, count)) {
         good = fill(table, v, rows, count);
-        free(v[AXES]), free(v[BRANCHES]), free(v[TERMS]), free(v[COEFFICIENTS]);
+        free(v[AXES]), free(v[BRANCHES]), free(v[TERMS]);
         if (good)
             return NULL;
         read_table_free(table);

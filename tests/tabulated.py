@@ -63,6 +63,12 @@ def not_a_number(x):
     return np.where(x > 0.7, np.nan, 1 + x)
 
 
+def holed(x, y):
+    """Two outputs, NaN beyond 0.7 of the first number."""
+    a = np.where(x > 0.7, np.nan, 1 + x * np.sin(3 * y))
+    return a, np.exp(x + y)
+
+
 def wrong_shape(x):
     """Three numbers whatever it is given."""
     return np.zeros(3)

@@ -279,8 +279,7 @@ static bool coefficients_end(size_t count, size_t cells, size_t axes, size_t out
         const int32_t of_axis = terms[(cells - 1) * axes + k];
         if (of_axis < 1 || of_axis > MBMA_MAX_TERMS)
             return false;
-        const size_t lanes = k + 1 == axes ? MBMA_LANES : 1;
-        size *= ((size_t)of_axis + lanes - 1) / lanes * lanes;
+        size *= (size_t)of_axis;
     }
     const int64_t start = starts[cells - 1];
     return start >= 0 && (size_t)start <= count && count - (size_t)start == size;

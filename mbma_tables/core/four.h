@@ -4,13 +4,15 @@
 
 #include "elementary.h"
 
-/* fma4(a, y, b) is a y + b, which compilers do not vectorise by themselves here. */
+/* fma4(a, y, b) is a y + b and fma44(a, b, c) is a b + c, which compilers do not vectorise by themselves here. */
 #if defined(__FMA__)
 #include <immintrin.h>
 typedef __m256d four;
 MBMA_INLINE four four_of(const double *row) { return _mm256_loadu_pd(row); }
 MBMA_INLINE four four_of_floats(const float *row) { return _mm256_cvtps_pd(_mm_loadu_ps(row)); }
 MBMA_INLINE four fma4(four a, double y, four b) { return _mm256_fmadd_pd(a, _mm256_set1_pd(y), b); }
+MBMA_INLINE four fma44(four a, four b, four c) { return _mm256_fmadd_pd(a, b, c); }
+MBMA_INLINE void four_to(double *row, four a) { _mm256_storeu_pd(row, a); }
 #else
 typedef struct {
     double lane[4];
@@ -29,6 +31,12 @@ MBMA_INLINE four fma4(four a, double y, four b) {
         b.lane[i] = mbma_fma(a.lane[i], y, b.lane[i]);
     return b;
 }
+MBMA_INLINE four fma44(four a, four b, four c) {
+    for (int i = 0; i < 4; i++)
+        c.lane[i] = mbma_fma(a.lane[i], b.lane[i], c.lane[i]);
+    return c;
+}
+MBMA_INLINE void four_to(double *row, four a) { memcpy(row, &a, sizeof a); }
 #endif
 
 #endif

@@ -126,7 +126,7 @@ size_t mbma_island_totals(size_t n, const double *hurst, const double *zeta_1, c
 
 /* ---- cells.c: tables of any function ------------------------------------------------------------------------------ */
 
-enum { MBMA_MAX_AXES = 6, MBMA_MAX_TERMS = 24, MBMA_LANES = 4 };
+enum { MBMA_MAX_AXES = 6, MBMA_MAX_TERMS = 24 };
 enum { MBMA_REFUSED = 0, MBMA_NEAREST = 1, MBMA_PERIODIC = 2 }; /* what an axis answers outside its range */
 enum { MBMA_POLYNOMIAL = -1, MBMA_NO_ANSWER = -2 };             /* boxes that are not halved */
 
@@ -138,8 +138,8 @@ typedef struct {
 
 /* Boxes, of which the first is the whole range: the axis at whose `middle` a box is halved and the number of its lower
  * half, which the upper follows; or MBMA_POLYNOMIAL and the number of a cell, or MBMA_NO_ANSWER. A cell has its terms
- * along each axis, where its coefficients start, those of one output after the other with the last axis fastest, whose
- * terms are followed by zeros up to a multiple of MBMA_LANES, and a bound on the error of each output, relative for those whose logarithm is stored (`is_exponential`). */
+ * along each axis, where its coefficients start, those of one output after the other with the last axis fastest, and a
+ * bound on the error of each output, relative for those whose logarithm is stored (`is_exponential`). */
 typedef struct {
     size_t axes, outputs, boxes, cells, coefficient_count;
     const mbma_axis *axis;

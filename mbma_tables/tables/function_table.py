@@ -43,7 +43,6 @@ IN_CORE = {"raise": 0, "nan": 0, "nearest": 1, "periodic": 2}  # as in mbma.h
 BLOCK = 1 << 14  # points between two checks for Ctrl-C
 STEPS = 80  # of an inverse
 NUMBERS = ("axis_numbers", "output_numbers")
-LANES = 4  # `MBMA_LANES` of mbma.h
 ROUNDING = 4e-15
 SOLVED = 1e-15  # relative, of an inverse; of a logarithm absolute where it is small
 
@@ -259,22 +258,6 @@ class FunctionTable:
         return spread
 
     @shared_property
-    def core_arrays(self) -> dict[str, Any]:
-        """The arrays as the core has them: terms of the last axis followed by zeros to a multiple of LANES."""
-        terms = self.arrays["terms"].astype(int)
-        last = terms[:, -1]
-        padded = -(-last // LANES) * LANES
-        rows = len(self.outputs) * terms[:, :-1].prod(axis=1)
-        starts = np.concatenate([[0], np.cumsum(rows * padded)])
-        widths = np.repeat(padded, rows)
-        used = np.repeat(last, rows)
-        first = np.concatenate([[0], np.cumsum(widths)])[:-1]
-        within = np.arange(used.sum()) - np.repeat(np.cumsum(used) - used, used)
-        coefficients = np.zeros(starts[-1])
-        coefficients[np.repeat(first, used) + within] = self.arrays["coefficients"]
-        return self.arrays | {"starts": starts[:-1], "coefficients": coefficients}
-
-    @shared_property
     def _core(self) -> tuple[Any, ...]:
         """The table as arguments of the core."""
         rows = [
@@ -289,7 +272,7 @@ class FunctionTable:
         whole = {"starts": np.int64, "branches": np.int32, "terms": np.int32}
         arrays = {
             name: np.ascontiguousarray(array, dtype=whole.get(name, np.float64)).ravel()
-            for name, array in self.core_arrays.items()
+            for name, array in self.arrays.items()
         }
         names = ("branches", "middles", "starts", "terms", "coefficients", "errors")
         exponential = np.array(logs, dtype=np.int32)

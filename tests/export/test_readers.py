@@ -69,7 +69,7 @@ def in_c(tmp_path_factory):
     if not (settings and shutil.which("gcc")):
         pytest.skip("gcc or libnetcdf is not installed")
     folder = tmp_path_factory.mktemp("c")
-    for name in ("cells.c", "elementary.h", "mbma.h"):
+    for name in ("cells.c", "elementary.h", "four.h", "mbma.h"):
         (folder / name).write_text(core_file(name))
     for name in ("read_table.c", "read_table.h"):
         shutil.copy(EXAMPLES / name, folder)

@@ -105,7 +105,7 @@ def _parts(
     """Places of the templates."""
     arrays = {
         key: numerals(array.astype(int) if key in WHOLE else array)
-        for key, array in (table.core_arrays if language == "c" else table.arrays).items()
+        for key, array in table.arrays.items()
     }
     rows = [
         [
@@ -165,7 +165,7 @@ def _c_files(parts: dict[str, Any], name: str) -> dict[str, str]:
     }
     files[f"{name}_selftest.c"] = filled("model/function/selftest.c", **parts)
     return files | {
-        each: core_file(each) for each in ("cells.c", "elementary.h", "mbma.h")
+        each: core_file(each) for each in ("cells.c", "elementary.h", "four.h", "mbma.h")
     }
 
 
