@@ -283,6 +283,7 @@ def _words(name: str) -> tuple[str, ...]:
     return tuple(sorted(re.findall(r"[a-z0-9.]+", plain)))
 
 
+KEPT = 256  # pairs of metals
 _METALS, _NAMES = _metals()
 METALS = tuple(_METALS)
 HARDEST = max(metal.hardness[1] for metal in _METALS.values())
@@ -368,18 +369,18 @@ class Pair:
 
     metals: tuple[Metal, Metal]
 
-    @property
+    @functools.cached_property
     def E_star(self) -> str:
         """Effective modulus with its unit."""
         a, b = self.metals
         return f"{effective_modulus(a.E, a.nu, b.E, b.nu):.17g} GPa"
 
-    @property
+    @functools.cached_property
     def softer(self) -> Metal:
         """The softer metal, which yields."""
         return min(self.metals, key=lambda metal: metal.hardness)
 
-    @property
+    @functools.cached_property
     def hardness(self) -> str | None:
         """Hardness of the softer one with its unit.
 
@@ -388,7 +389,7 @@ class Pair:
         soft, hard = self.softer.hardness
         return f"{math.sqrt(soft * hard):.6g} GPa" if hard <= ONE_TEMPER * soft else None
 
-    @property
+    @functools.cached_property
     def conductivities(self) -> tuple[str, str]:
         """Thermal conductivities with their unit, geometric means of the ranges."""
         first, second = self.metals
@@ -436,7 +437,15 @@ def pair(
     )
     if len(metals) not in (1, 2):
         raise InputError(f"materials are one or two, got {len(metals)}")
+    if all(isinstance(metal, str) for metal in metals):
+        return _named_pair(metals[0], metals[-1])
     return Pair((_metal(metals[0]), _metal(metals[-1])))
+
+
+@functools.lru_cache(maxsize=KEPT)
+def _named_pair(first: str, second: str) -> Pair:
+    """Two metals by their names, whose constants follow once for many joints."""
+    return Pair((get(first), get(second)))
 
 
 def _metal(metal: Any) -> Metal:

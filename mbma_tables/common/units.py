@@ -404,13 +404,7 @@ class Dimension:
 
         Units of heat and of currents are those of the SI, as conductivities are given in them.
         """
-        if not self.is_mechanical:
-            return NAMED.get(self) or _product(
-                {"m": self.length, "Pa": self.stress, **self._of_time()}
-            )
-        return _product(
-            {units.stress or "stress": self.stress, units.length or "length": self.length}
-        )
+        return _unit_of(self, units)
 
     def _of_time(self) -> dict[str, int]:
         return {"s": self.time, "K": self.temperature, "A": self.current}
@@ -421,6 +415,15 @@ HEAT_CONDUCTANCE = Dimension(length=1, stress=1, time=-1, temperature=-1)
 #: per area, from current^2 = power/resistance
 ELECTRICAL_CONDUCTANCE = Dimension(length=-5, stress=-1, time=1, current=2)
 NAMED = {HEAT_CONDUCTANCE: "W/(m^2 K)", ELECTRICAL_CONDUCTANCE: "S/m^2"}
+
+
+@functools.lru_cache(maxsize=1024)
+def _unit_of(dimension: Dimension, units: Units) -> str:
+    if not dimension.is_mechanical:
+        powers = {"m": dimension.length, "Pa": dimension.stress, **dimension._of_time()}
+        return NAMED.get(dimension) or _product(powers)
+    stress, length = units.stress or "stress", units.length or "length"
+    return _product({stress: dimension.stress, length: dimension.length})
 
 
 def _product(powers: Mapping[str, int]) -> str:

@@ -123,6 +123,7 @@ class Contact(State, Displayed):
     ) -> None:
         self._setup = setup
         self._values: dict[str, Any] = dict(values)
+        self._missing: dict[str, list[Need]] = {}
         self._answer = answer
         self._loaded = loaded
         #: number of islands evaluated; None if computed by dask or if the theory has none
@@ -243,7 +244,9 @@ class Contact(State, Displayed):
 
     def missing(self, name: str) -> list[Need]:
         """What a quantity needs and was not given."""
-        return registry.get(name).missing(self)
+        if name not in self._missing:
+            self._missing[name] = registry.get(name).missing(self)
+        return self._missing[name]
 
     def available(self) -> list[str]:
         """Names of the quantities for which everything needed was given."""

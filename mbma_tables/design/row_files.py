@@ -19,6 +19,7 @@ from mbma_tables.common.files import drafted
 from mbma_tables.common.netcdf import HDF5_LOCK
 
 CHUNK = 20_000  # rows that are in memory at a time
+LINES = 1_000  # of a file that are read together
 _SPECIAL = re.compile('[,"\r\n]')  # signs that end cells or lines
 _HEADER = re.compile(r"\s*(.*?)\s*(?:\[\s*(.*?)\s*\])?\s*")
 
@@ -101,7 +102,7 @@ def opened(path: pathlib.Path) -> Iterator[Source]:
 
 def _csv_source(path: pathlib.Path, stream: TextIO, size: int) -> Source:
     read = [0]
-    rows = csv.reader(_counted(stream, read))
+    rows = csv.reader(itertools.chain.from_iterable(_counted(stream, read)))
     headers = next(rows, None)
     if headers is None:
         raise InputError(f"{path} has no header: the first line names the columns")
@@ -114,12 +115,11 @@ def _csv_source(path: pathlib.Path, stream: TextIO, size: int) -> Source:
     return _source(path, headers, chunks())
 
 
-def _counted(stream: TextIO, read: list[int]) -> Iterator[str]:
-    """Lines without comments and empty ones; the number of characters goes to `read`."""
-    for line in stream:
-        read[0] += len(line)
-        if line.strip() and line[0] != "#":
-            yield line
+def _counted(stream: TextIO, read: list[int]) -> Iterator[list[str]]:
+    """Lines without comments and empty ones, many together; the number of characters goes to `read`."""
+    while lines := list(itertools.islice(stream, LINES)):
+        read[0] += sum(map(len, lines))
+        yield [line for line in lines if line[0] != "#" and not line.isspace()]
 
 
 def _some(rows: Iterator[list[str]]) -> list[list[str]]:
@@ -134,11 +134,12 @@ def _chunk_of_cells(names: list[str], cells: list[list[str]], done: float) -> Ch
     """Rows of text; those of another length are named."""
     width = len(names)
     faults = {}
-    for k, row in enumerate(cells):
-        if len(row) != width:
-            cut = f", the last ones {row[width:]}" if len(row) > width else ""
-            faults[k] = f"the row has {len(row)} cells, the header {width}{cut}"
-            cells[k] = (row + [""] * width)[:width]
+    widths = np.fromiter(map(len, cells), int, len(cells))
+    for k in np.flatnonzero(widths != width).tolist():
+        row = cells[k]
+        cut = f", the last ones {row[width:]}" if len(row) > width else ""
+        faults[k] = f"the row has {len(row)} cells, the header {width}{cut}"
+        cells[k] = (row + [""] * width)[:width]
     columns = zip(*cells, strict=True)
     return Chunk(
         {name: list(column) for name, column in zip(names, columns, strict=True)},
@@ -239,8 +240,7 @@ def _csv_writer(stream: TextIO, headers: Mapping[str, str]) -> Writer:
 def csv_lines(columns: Mapping[str, Any], names: Sequence[str]) -> str:
     """The lines of some columns in this order."""
     cells = [_written(columns[name]) for name in names]
-    lines = map(",".join, zip(*cells, strict=True))
-    return "".join(f"{line}\n" for line in lines)
+    return "\n".join(map(",".join, zip(*cells, strict=True))) + "\n"
 
 
 def _written(column: Any) -> Sequence[str]:

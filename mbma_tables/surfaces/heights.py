@@ -195,11 +195,14 @@ def highest_point(
     allowed = f"at least {at_least:.4g}, where the highest point is at 2 h_rms"
     require("nominal_area", area, area >= least, allowed)
     x = np.sqrt(-2 * np.log(np.minimum(c, 0.5)))
-    # the error of a level falls fourfold in each step, or faster: to rounding in 60
+    # Newton's method for x^2/2 - ln x + ln c, which is convex
+    log_c = np.log(c)
     for _ in range(60):
-        last = x
-        x = np.sqrt(2 * np.log(np.maximum(x, LEAST) / c))
-        if np.array_equal(x, last):
+        miss = 0.5 * x * x - np.log(x) + log_c
+        step = miss / (x - 1 / x)
+        x = np.maximum(x - step, LEAST)
+        # what is left is about the square of this
+        if (np.abs(step) <= 1e-9 * x).all():
             break
     return np.asarray(height * x)
 
@@ -217,10 +220,10 @@ def of_area(
         )
     number = Units(surface.unit).number("nominal_area", nominal_area)
     area = finite_array("nominal_area", number)
-    median = highest_point(surface.h_rms, surface.m2, area)
-    # two of three surfaces are between
+    # two of three surfaces are between low, which needs the largest area, and high
     low = highest_point(surface.h_rms, surface.m2, area, 0.16)
-    high = highest_point(surface.h_rms, surface.m2, area, 0.84)
+    chances = np.reshape([0.5, 0.84], (2, *[1] * low.ndim))
+    median, high = highest_point(surface.h_rms, surface.m2, area, chances)
     assumption = (
         "h_max is the median over Gaussian surfaces of the nominal area; two of three are "
         "between from and to"

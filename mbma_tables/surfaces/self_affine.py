@@ -124,27 +124,38 @@ class SelfAffine(AnySurface):
     def __post_init__(self, nominal_area: Any) -> None:
         units = Units(self.unit)
         vars(self).update(unit=units.length)
+        given = self.h_max
         if nominal_area is not None:
             # derived from the other numbers, which are checked for that
-            numbers = [
-                units.number(name, getattr(self, name)) for name in PARAMETERS[:-1]
-            ]
-            like = dataclasses.replace(
-                self,
-                **dict(zip(PARAMETERS, [*numbers, 1.0], strict=True)),
-                nominal_area=None,
-            )
-            h_max, provenance = of_area(like, nominal_area, self.h_max)
-            vars(self).update(h_max=h_max, provenance=provenance)
-        elif self.h_max is None:
+            for name in PARAMETERS[:-1]:
+                vars(self)[name] = units.number(name, getattr(self, name))
+            vars(self).update(h_max=1.0)
+        elif given is None:
             raise InputError(
                 "h_max is missing: the highest point above the mid-plane, or give the nominal_area"
             )
-        if self.labelled:
+        if not self.labelled:
+            self._check()
+        elif nominal_area is None:
             for name in PARAMETERS:
                 units.number(name, getattr(self, name))
             # perhaps lazy: checked block by block, where numbers are computed
+        if nominal_area is not None:
+            self._end_at(*of_area(self, nominal_area, given))
+
+    def _end_at(self, h_max: Any, provenance: tuple[Mapping[str, Any], ...]) -> None:
+        """Take a highest point, perhaps of an array of nominal areas."""
+        if np.shape(h_max) == self.shape:
+            highest = frozen(np.array(h_max))[()]
+            vars(self).update(h_max=highest, provenance=provenance)
             return
+        batch = dataclasses.replace(self, h_max=h_max, provenance=provenance)
+        # what is derived has the shape of the batch
+        vars(self).clear()
+        vars(self).update(vars(batch))
+
+    def _check(self) -> None:
+        """Numbers of one shape, each in its range."""
         parameters = {
             name: finite_array(name, getattr(self, name)) for name in PARAMETERS
         }

@@ -34,6 +34,7 @@ from mbma_tables.contacts.quantities.gas import GASES
 from mbma_tables.export.code.law_code import law_text
 from mbma_tables.export.registry import targets
 from mbma_tables.export.rows.law_rows import describe_law
+from mbma_tables.surfaces.self_affine import SelfAffine
 from mbma_tables.theories.calibrated.theory import Calibrated
 
 FACE = {"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
@@ -1083,3 +1084,20 @@ def test_exports_about_a_preload_are_of_unloading():
     code = joint.export("c-law")
     assert "jump at the largest pressure" in code
     assert "solid_conductance" not in code.replace("without", "")
+
+
+def test_the_numbers_of_a_joint_are_checked_once(monkeypatch):
+    """Two faces, their sum, and that with its highest point: no surface is made to be thrown away."""
+    made = []
+    check = SelfAffine.__post_init__
+
+    def counted(surface, nominal_area):
+        made.append(surface)
+        check(surface, nominal_area)
+
+    monkeypatch.setattr(SelfAffine, "__post_init__", counted)
+    face = {"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
+    metals = ("steel 4140 hard", "aluminium 6061 hard")
+    joint = Joint(face, face | {"Rq": "0.7 um"}, bodies=metals, nominal_area="4 cm^2")
+    assert len(made) == 4
+    assert Joint(face, bodies=metals, nominal_area="4 cm^2").pair is joint.pair

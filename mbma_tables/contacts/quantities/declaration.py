@@ -74,7 +74,7 @@ class Quantity:
 
     def is_available(self, state: State) -> bool:
         """Whether a contact has it: all it needs is given."""
-        return not self.missing(state)
+        return not state.missing(self.name)
 
     def is_shown(self, state: State) -> bool:
         """Whether a contact shows it without being asked."""
@@ -82,7 +82,7 @@ class Quantity:
 
     def require_given(self, state: State) -> None:
         """Raise an error that names what is missing, where anything is."""
-        if missing := self.missing(state):
+        if missing := state.missing(self.name):
             remedies = "; ".join(dict.fromkeys(need.remedy for need in missing))
             names = " and ".join(need.name for need in missing)
             raise MissingError(f"{self.name} needs {names}, which is missing: {remedies}")
@@ -96,7 +96,7 @@ class Quantity:
 
     def unit(self, state: State) -> str:
         """Its unit in a contact."""
-        if self.unit_of_state is not None and not self.missing(state):
+        if self.unit_of_state is not None and self.is_available(state):
             return self.unit_of_state(state)
         return self.dimension.unit(state.unit_system)
 
