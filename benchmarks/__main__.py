@@ -49,7 +49,7 @@ from mbma_tables import (
 )
 from mbma_tables.common.files import shipped_file
 from mbma_tables.theories import Calibrated, Mbma
-from mbma_tables.theories.calibrated.formulas import Law, Spectrum
+from mbma_tables.theories.calibrated.formulas import Spectrum, SpectrumLaw
 
 POINTS = 20_000
 HELD_OUT = 500
@@ -266,7 +266,7 @@ def calibrated(rng: np.random.Generator) -> None:
     u = rng.uniform(0.01, 3.3, GAPS)
     some = u[:HELD_OUT]
     theory = Calibrated()
-    law = Law(Spectrum.self_affine(0.8, 64.0), 3.3)
+    law = SpectrumLaw(Spectrum.self_affine(0.8, 64.0), 3.3)
     taken = rounds(
         {
             "table": lambda: theory.answer(surface, u),

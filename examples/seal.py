@@ -89,7 +89,7 @@ def simulate(best: Contact, x: np.ndarray, grid: int, seed: int) -> float:
     gradient = float(Surface(hurst, Q0, np.exp(x[2]), h_rms, CREST * h_rms).rms_gradient)
     # in h_rms, and lengths stretched until the rms gradient is 1
     side = waves * LONGEST * gradient / h_rms
-    engine = boundary_elements.Contact(heights / h_rms, (side, side))
+    engine = boundary_elements.BoundaryElementContact(heights / h_rms, (side, side))
     flows = []
     for force in best.pressure[0, ::-1]:
         engine.press(force / E_STAR / gradient)

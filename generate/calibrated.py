@@ -36,7 +36,12 @@ from generate.files import dataset
 from generate.leakage_law import write as write_leakage
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.surfaces.surface import Surface
-from mbma_tables.theories.calibrated.formulas import CONSTANTS, Constants, Law, Spectrum
+from mbma_tables.theories.calibrated.formulas import (
+    CONSTANTS,
+    CalibratedConstants,
+    Spectrum,
+    SpectrumLaw,
+)
 from mbma_tables.theories.calibrated.map_curves import MAP_CONSTANTS, MapConstants
 from mbma_tables.theories.dataset import FILE
 from mbma_tables.theories.greenwood_williamson import GreenwoodWilliamson
@@ -80,7 +85,7 @@ class Parts:
         flat = dataclasses.replace(CONSTANTS, weight_slope=0.0)
 
         def separation(weight: float, cubic: float) -> FloatArray:
-            law = Law(
+            law = SpectrumLaw(
                 spectrum, None, dataclasses.replace(flat, weight=weight, cubic=cubic)
             )
             u, _ = law.separation_persson(np.exp(GRID))
@@ -91,9 +96,9 @@ class Parts:
         self.first = separation(1.0, 0.0) - self.plain
         self.cubic = separation(0.0, 1.0) - self.plain
 
-    def errors(self, one: Case, trial: Constants) -> FloatArray:
+    def errors(self, one: Case, trial: CalibratedConstants) -> FloatArray:
         """Errors of ln F at equal u, as `errors` has them, without a quadrature for every trial."""
-        law = Law(self.spectrum, None, trial)
+        law = SpectrumLaw(self.spectrum, None, trial)
         a, b, _ = law.coefficients
         u = self.plain + a * self.first + b * self.cubic
         log_force_at = CubicSpline(np.log(u), GRID - law.tail * u**3)
@@ -107,15 +112,15 @@ class Parts:
         )
 
 
-def fit(training: Sequence[Case], tail: bool = False) -> Constants:
+def fit(training: Sequence[Case], tail: bool = False) -> CalibratedConstants:
     """The spectrum's law: area at equal force, then force at equal u; or the tail alone."""
     seen = [one for one in training if one.gaussian]
     pairs = [(one, Parts(one.spectrum)) for one in seen]
 
-    def areas(trial: Constants) -> list[FloatArray]:
+    def areas(trial: CalibratedConstants) -> list[FloatArray]:
         return [errors(one, one.law(trial), "area") / noise(one, "area") for one in seen]
 
-    def forces(trial: Constants) -> list[FloatArray]:
+    def forces(trial: CalibratedConstants) -> list[FloatArray]:
         return [parts.errors(one, trial) / noise(one, "force") for one, parts in pairs]
 
     if tail:
@@ -126,7 +131,7 @@ def fit(training: Sequence[Case], tail: bool = False) -> Constants:
     )
 
 
-def fit_map(training: Sequence[Case], constants: Constants) -> MapConstants:
+def fit_map(training: Sequence[Case], constants: CalibratedConstants) -> MapConstants:
     """The map's law: area of stretched surfaces, then force at equal u of all kinds."""
     stretched = [one for one in training if one.kind == "stretched"]
     wide = [one for one in training if one.waves >= MIN_WAVES]

@@ -24,7 +24,11 @@ from mbma_tables.common.netcdf import HDF5_LOCK, SEAL
 from mbma_tables.common.workers import results
 from mbma_tables.tables.sources import source_digest, versions
 from mbma_tables.tables.splines import coefficients
-from mbma_tables.theories.calibrated.formulas import Constants, Law, Spectrum
+from mbma_tables.theories.calibrated.formulas import (
+    CalibratedConstants,
+    Spectrum,
+    SpectrumLaw,
+)
 from mbma_tables.theories.calibrated.table import AXES, load
 from mbma_tables.theories.dataset import read_groups
 
@@ -262,7 +266,7 @@ def write_part(path: os.PathLike[str] | str, data: xr.Dataset, group: str = "/")
     write_file(path, body + seal, make_folders=True)
 
 
-def log_force(law: Law) -> FloatArray:
+def log_force(law: SpectrumLaw) -> FloatArray:
     """ln F_G at the nodes in separation."""
     log_u = NODES["log_separation"]
     u, _ = law.separation_persson(np.exp(LOG_FORCE))
@@ -277,11 +281,11 @@ def log_force(law: Law) -> FloatArray:
     return np.asarray(log_F - law.tail * np.exp(3 * log_u))
 
 
-def _row(constants: Constants, hurst: float) -> FloatArray:
+def _row(constants: CalibratedConstants, hurst: float) -> FloatArray:
     rows = []
     for log_zeta in NODES["log_zeta_1"]:
         spectrum = Spectrum.self_affine(float(hurst), float(np.exp(log_zeta)))
-        rows.append(log_force(Law(spectrum, None, constants)))
+        rows.append(log_force(SpectrumLaw(spectrum, None, constants)))
     return np.array(rows)
 
 
@@ -315,7 +319,7 @@ def certificate(path: pathlib.Path) -> dict[str, float]:
         surface_of_point = np.zeros(u.size, np.int64)
         from_table = answer((surface_of_point, u))[[0, 2, 1]]
 
-        law = Law(
+        law = SpectrumLaw(
             Spectrum.self_affine(hurst, float(np.exp(log_zeta))), top, table.constants
         )
         force, stiffness = law.contact(u)[::2]
@@ -333,7 +337,7 @@ def certificate(path: pathlib.Path) -> dict[str, float]:
 
 def write(
     path: pathlib.Path,
-    constants: Constants,
+    constants: CalibratedConstants,
     map_constants: Any,
     edges: Sequence[float],
     stated: Stated,

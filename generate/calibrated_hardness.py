@@ -63,7 +63,7 @@ WAVES = 3  # longest waves a side: with fewer h_max says little of the highest h
 
 
 def errors(
-    one: Capped, part: str, constants: cap.Constants, share: int = 0
+    one: Capped, part: str, constants: cap.YieldConstants, share: int = 0
 ) -> FloatArray:
     """Errors of a part where the elastic contact is the simulated one.
 
@@ -94,9 +94,9 @@ def fitted_to(one: Capped) -> Any:
     return (one.area > LIGHTEST) & (one.area < HEAVIEST)
 
 
-def fit(seen: Sequence[Capped]) -> cap.Constants:
+def fit(seen: Sequence[Capped]) -> cap.YieldConstants:
 
-    def residuals(part: str, noise: float, trial: cap.Constants) -> list[FloatArray]:
+    def residuals(part: str, noise: float, trial: cap.YieldConstants) -> list[FloatArray]:
         return [errors(one, part, trial)[fitted_to(one)] / noise for one in seen]
 
     constants = cap.CONSTANTS
@@ -112,7 +112,7 @@ def fit(seen: Sequence[Capped]) -> cap.Constants:
 def frozen_errors(
     one: Capped,
     elastic: tuple[FloatArray, ...],
-    constants: cap.Constants,
+    constants: cap.YieldConstants,
 ) -> FloatArray:
     """ln of a theory's frozen stiffness over the simulated one at equal force.
 
@@ -133,7 +133,9 @@ def frozen_errors(
 
 
 @functools.cache
-def errors_of(one: Capped, name: str, constants: cap.Constants) -> dict[str, FloatArray]:
+def errors_of(
+    one: Capped, name: str, constants: cap.YieldConstants
+) -> dict[str, FloatArray]:
     """Errors of a theory with a hardness.
 
     ln of area and stiffness at equal force, ln of force at equal u, and the yielded share.
@@ -164,7 +166,7 @@ def errors_of(one: Capped, name: str, constants: cap.Constants) -> dict[str, Flo
 
 
 def errors_of_other(
-    one: Capped, name: str, constants: cap.Constants
+    one: Capped, name: str, constants: cap.YieldConstants
 ) -> dict[str, FloatArray]:
     """Errors of force, area and frozen stiffness of a theory that is not the calibrated one."""
     surface = one.surface
@@ -198,7 +200,7 @@ def errors_of_other(
 def told(
     seen: Sequence[Capped],
     name: str,
-    constants: Callable[[Capped], cap.Constants],
+    constants: Callable[[Capped], cap.YieldConstants],
 ) -> pd.DataFrame:
     """Errors of a theory on surfaces, a row a load, with what the surface is.
 
@@ -243,7 +245,9 @@ def by_contact(frame: pd.DataFrame, quantity: str, area: str = "contact") -> Flo
     return np.array(rows)
 
 
-def weight_of_elastic(one: Capped, quantity: str, constants: cap.Constants) -> FloatArray:
+def weight_of_elastic(
+    one: Capped, quantity: str, constants: cap.YieldConstants
+) -> FloatArray:
     """d ln of the area or the force with a hardness by d ln of the elastic one."""
     if quantity == "area":
         more = np.minimum(one.elastic_area * np.exp(TURN), 1.0)
@@ -259,7 +263,7 @@ def weight_of_elastic(one: Capped, quantity: str, constants: cap.Constants) -> F
 
 
 def by_magnification(
-    seen: Sequence[Capped], constants: cap.Constants
+    seen: Sequence[Capped], constants: cap.YieldConstants
 ) -> dict[str, list[float]]:
     """Mean errors of the parts by zeta_1 at the hardness where they are largest.
 
@@ -316,7 +320,7 @@ def blind() -> dict[str, FloatArray]:
 
 def coverage(
     seen: Sequence[Capped],
-    constants: cap.Constants,
+    constants: cap.YieldConstants,
     scatter: Scatter,
 ) -> dict[str, list[float]]:
     """Shares of errors within one and two of the stated standard deviations.
@@ -341,14 +345,14 @@ def coverage(
     return shares
 
 
-def stated(training: Sequence[Capped], constants: cap.Constants) -> Scatter:
+def stated(training: Sequence[Capped], constants: cap.YieldConstants) -> Scatter:
     """Root mean squares of errors by constants from other spectra.
 
     And how much of an elastic error is passed on.
     """
     constants_of_others = cross_validated(training, fit)
 
-    def unseen(one: Capped) -> cap.Constants:
+    def unseen(one: Capped) -> cap.YieldConstants:
         return constants_of_others[one.node]
 
     rms_of_theories = {}
@@ -392,7 +396,7 @@ def sets_of(frame: pd.DataFrame) -> dict[str, pd.Series]:
 def write(
     evidence: xr.Dataset,
     path: os.PathLike[str] | str | None,
-) -> tuple[cap.Constants, xr.Dataset]:
+) -> tuple[cap.YieldConstants, xr.Dataset]:
     contacts = capped(evidence)
     plain = [one for one in contacts if one.kind in GAUSSIAN]
     training = [one for one in plain if one.split == TRAINING]

@@ -25,7 +25,7 @@ from mbma_tables import Surface, contact, contact_law
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.design.scenes.plan import Distance
 from mbma_tables.theories import Mbma, Persson, Theory
-from mbma_tables.theories.calibrated.formulas import Law, Spectrum, area
+from mbma_tables.theories.calibrated.formulas import Spectrum, SpectrumLaw, area
 
 SIMULATED = "boundary elements"
 # of each timed surface, in one call
@@ -83,7 +83,7 @@ def timed(answer: Callable[[Surface, FloatArray], Any], count: int = POINTS) -> 
 def quadrature(surface: Surface, u: FloatArray) -> Any:
     """Force and area by the calibrated law's own integrals."""
     spectrum = Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1))
-    law = Law(spectrum, float(surface.h_max))
+    law = SpectrumLaw(spectrum, float(surface.h_max))
     force = law.force(u)
     return force, law.area(force)
 

@@ -40,8 +40,8 @@ from mbma_tables.islands.variants import REPORTED, Variant
 from mbma_tables.theories.calibrated.formulas import (
     CONSTANTS,
     YANG_PERSSON,
-    Law,
     Spectrum,
+    SpectrumLaw,
 )
 from mbma_tables.theories.calibrated.map_curves import MAP_CONSTANTS
 from mbma_tables.theories.dataset import FILE
@@ -92,7 +92,7 @@ THEORIES: dict[str, Callable[[Case], Any]] = {
     "MBMA cover": _mbma(COVER),
     "calibrated": lambda one: one.law(CONSTANTS),
     "calibrated, map": _map,
-    "Persson": lambda one: Law(one.spectrum, None, YANG_PERSSON),
+    "Persson": lambda one: SpectrumLaw(one.spectrum, None, YANG_PERSSON),
     "Persson simplified": _theory(theories.Persson("simplified")),
     "G-W": _theory(theories.GreenwoodWilliamson()),
 }

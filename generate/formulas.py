@@ -34,7 +34,7 @@ from mbma_tables.export.model.own_formula import certificate, rounded
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.island_models import Certificate
 from mbma_tables.theories.mbma.closed_form_certificates import RANGES
-from mbma_tables.theories.mbma.closed_forms import FUNCTIONS, Function, Steps, evaluate
+from mbma_tables.theories.mbma.closed_forms import FUNCTIONS, ClosedForm, Steps, evaluate
 
 FORMS = ROOT / "mbma_tables" / "theories" / "mbma" / "closed_forms.toml"
 MODULE = ROOT / "mbma_tables" / "theories" / "mbma" / "closed_form_certificates.py"
@@ -81,7 +81,7 @@ def wrapped_steps(name: str, steps: Iterable[tuple[str, str]]) -> list[str]:
     return [*lines, '"""']
 
 
-def shared_steps(functions: Iterable[Function]) -> list[tuple[str, str]]:
+def shared_steps(functions: Iterable[ClosedForm]) -> list[tuple[str, str]]:
     """Steps with which all functions of a form begin."""
     shared = []
     steps_of_functions = (function.steps.items() for function in functions)
@@ -92,7 +92,7 @@ def shared_steps(functions: Iterable[Function]) -> list[tuple[str, str]]:
     return shared
 
 
-def forms_text(text: str, functions: Mapping[str, Mapping[str, Function]]) -> str:
+def forms_text(text: str, functions: Mapping[str, Mapping[str, ClosedForm]]) -> str:
     """The file of the closed forms, below its opening comment."""
     opening = text.partition("\n\n")[0]
     lines = [opening]
@@ -289,7 +289,7 @@ def _place_in_fit(product: collections.Counter[str]) -> tuple[bool, bool, bool, 
 
 
 def samples_of_islands(
-    function: Function,
+    function: ClosedForm,
 ) -> tuple[Mapping[str, FloatArray], FloatArray, FloatArray]:
     """Values of the steps, the target of the sum log_Q, and the weights of its errors."""
     arguments, truth = islands(function.form, POINTS, FIT_SEED)
@@ -299,7 +299,7 @@ def samples_of_islands(
 
 
 def samples_of_totals(
-    function: Function,
+    function: ClosedForm,
     branch: str,
     start: str,
     letters: Iterable[str],
@@ -320,7 +320,7 @@ def samples_of_totals(
     return on_samples, target, np.ones(target.size)
 
 
-def coefficients(function: Function, name: str, text: str) -> FloatArray:
+def coefficients(function: ClosedForm, name: str, text: str) -> FloatArray:
     """Coefficients of the terms of one sum of a function, of least largest error."""
     split_terms = terms(text)
     start = " ".join(rest for number, rest in split_terms if not number)
@@ -374,7 +374,7 @@ def sum_text(text: str, fitted: FloatArray) -> str:
     return joined.replace("- ", "-", 1)
 
 
-def refitted(function: Function, fits: Mapping[str, FloatArray], digits: int) -> Steps:
+def refitted(function: ClosedForm, fits: Mapping[str, FloatArray], digits: int) -> Steps:
     """The steps of a function with these coefficients, of so many digits."""
     steps = {}
     for name, text in function.steps.items():
@@ -394,7 +394,7 @@ def rises(steps: Steps, result: str, ranges: Mapping[str, tuple[float, float]]) 
     return bool(is_positive and (np.diff(field, axis=0) > 0).all())
 
 
-def relative_errors(function: Function, steps: Steps, samples: Samples) -> FloatArray:
+def relative_errors(function: ClosedForm, steps: Steps, samples: Samples) -> FloatArray:
     """Magnitudes of the relative errors of a function with these steps."""
     arguments, truth = samples
     value = evaluate(steps, arguments)[function.result]
@@ -402,7 +402,7 @@ def relative_errors(function: Function, steps: Steps, samples: Samples) -> Float
 
 
 def shortest(
-    function: Function, fits: Mapping[str, FloatArray], samples: Samples
+    function: ClosedForm, fits: Mapping[str, FloatArray], samples: Samples
 ) -> Steps:
     """Steps with coefficients of the fewest digits whose largest error is about that of all."""
 
@@ -419,7 +419,7 @@ def shortest(
     return refitted(function, fits, digits)
 
 
-def certified(function: Function) -> tuple[Function, Certificate]:
+def certified(function: ClosedForm) -> tuple[ClosedForm, Certificate]:
     """A function with coefficients fitted again, as short as errors allow, and its certificate."""
     fits = {}
     for name, text in function.steps.items():
@@ -451,7 +451,7 @@ def certified(function: Function) -> tuple[Function, Certificate]:
 @click.command()
 def formulas() -> None:
     """Fit and certify the closed forms; write them and the module of their certificates (a minute)."""
-    fitted: dict[str, dict[str, Function]] = {form: {} for form in RANGES}
+    fitted: dict[str, dict[str, ClosedForm]] = {form: {} for form in RANGES}
     certificates: dict[str, dict[str, Certificate]] = {form: {} for form in RANGES}
     for form, results in FUNCTIONS.items():
         for result, shipped in results.items():

@@ -19,7 +19,7 @@ from mbma_tables.common import progress
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file
 from mbma_tables.contacts.quantities.gas_flow import POWER, WIDER, flow_over_liquid
-from mbma_tables.theories.simulated.boundary_elements import Contact
+from mbma_tables.theories.simulated.boundary_elements import BoundaryElementContact
 from mbma_tables.theories.simulated.reynolds import flow_conductance
 
 FILE = files.ROOT / "docs" / "data" / "gas_flow.csv"
@@ -57,7 +57,7 @@ def rows_of(
     recipe = Recipe("self_affine", hurst, zeta_1, waves, seed, POINTS)
     height, _, _ = prepared(heights(recipe), recipe.sizes, recipe.q0)
     cap = eta or np.inf
-    contact = Contact(height, recipe.sizes, hardness=cap)
+    contact = BoundaryElementContact(height, recipe.sizes, hardness=cap)
     h_rms = float(height.std())
     for area in AREAS:
         force = load_at(area, cap)

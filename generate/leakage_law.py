@@ -40,9 +40,9 @@ from mbma_tables.tables.splines import coefficients
 from mbma_tables.theories import resolve
 from mbma_tables.theories.calibrated.formulas import (
     CONSTANTS,
-    Constants,
-    Law,
+    CalibratedConstants,
     Spectrum,
+    SpectrumLaw,
     force_at_area,
     light_factor,
 )
@@ -109,7 +109,7 @@ class Case(Simulated):
         """Whether its errors are those that are stated."""
         return self.isotropic and self.zeta_1 < LARGE
 
-    def law(self, constants: Constants) -> tuple[FloatArray, FloatArray]:
+    def law(self, constants: CalibratedConstants) -> tuple[FloatArray, FloatArray]:
         """A/A0 and mean gap by the calibrated law, from the spectrum and h_max.
 
         And from a hardness where it yielded, the last of `node`.
@@ -118,7 +118,7 @@ class Case(Simulated):
             hardness = float(self.node[-1]) * self.spectrum.gradient
             curve = TheoryCurve(Yielding(resolve("calibrated"), hardness), self.surface)
             return curve.area(self.force), curve.separation(self.force)
-        law = Law(self.spectrum, self.h_max, constants)
+        law = SpectrumLaw(self.spectrum, self.h_max, constants)
         return law.area(self.force), law.separation(self.force)
 
     @functools.cached_property
@@ -159,7 +159,7 @@ def cases(data: xr.Dataset) -> list[Case]:
 class Flow:
     """Laws of flow on one surface, each as ln k at the surface's loads; -inf where blocked."""
 
-    def __init__(self, one: Case, constants: Constants) -> None:
+    def __init__(self, one: Case, constants: CalibratedConstants) -> None:
         self.one = one
         self.area, self.u = one.law(constants)
         # gaps of contacts that yield are taken for those of elastic ones of equal area
@@ -395,7 +395,9 @@ def of_theories(flows: Sequence[Flow], constants: FlowConstants) -> dict[str, Fl
     return errors_of_theories
 
 
-def _row(constants: FlowConstants, contact: Constants, hurst: float) -> FloatArray:
+def _row(
+    constants: FlowConstants, contact: CalibratedConstants, hurst: float
+) -> FloatArray:
     area = constants.threshold / (1 + np.exp(-NODES["log_odds"]))
     factors = []
     for log_zeta in NODES["log_zeta_1"]:
@@ -428,7 +430,7 @@ def accuracy_by_set(
     return names, np.array(rows)
 
 
-def dataset(surfaces: Sequence[Case], contact: Constants) -> xr.Dataset:
+def dataset(surfaces: Sequence[Case], contact: CalibratedConstants) -> xr.Dataset:
     """The group `leakage` of the calibrated law's file, with that law's constants."""
     flows = [Flow(one, contact) for one in surfaces]
     constants = fit([flow for flow in flows if flow.one.split == TRAINING])
@@ -470,7 +472,7 @@ def dataset(surfaces: Sequence[Case], contact: Constants) -> xr.Dataset:
 def certificate(
     values: FloatArray,
     constants: FlowConstants,
-    contact: Constants,
+    contact: CalibratedConstants,
 ) -> tuple[float, float]:
     """Largest errors of ln R at held-out surfaces up to `LARGE`, and of all.
 

@@ -20,7 +20,7 @@ from mbma_tables.common import progress
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file
 from mbma_tables.contacts.quantities.leakage import OPENING
-from mbma_tables.theories.simulated.boundary_elements import Contact
+from mbma_tables.theories.simulated.boundary_elements import BoundaryElementContact
 from mbma_tables.theories.simulated.reynolds import flow_conductance
 
 FILE = files.ROOT / "docs" / "data" / "unloaded_flow.csv"
@@ -82,7 +82,7 @@ def solved(case: Any) -> dict[str, FloatArray]:
     recipe, eta = case.recipe, case.eta
     height, _, _ = prepared(heights(recipe), recipe.sizes, recipe.q0)
     h_rms = float(height.std())
-    contact = Contact(height, recipe.sizes, hardness=eta)
+    contact = BoundaryElementContact(height, recipe.sizes, hardness=eta)
 
     def row(
         found: dict[str, float], gap: FloatArray, *forces: float

@@ -24,7 +24,7 @@ from generate.unloading_fit import report
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file
 from mbma_tables.surfaces.bearing_curve import bearing
-from mbma_tables.theories.simulated.boundary_elements import Contact
+from mbma_tables.theories.simulated.boundary_elements import BoundaryElementContact
 
 TOLERANCE = 1e-5
 # A/A0 that largest pressures aim at, and pressures over the largest
@@ -109,7 +109,7 @@ def solved(group: Any) -> dict[str, FloatArray]:
     surface, sizes = group.map()
     h_rms = float(surface.std())
     eta = 1 / group.psi
-    loaded = Contact(surface, sizes, TOLERANCE, eta)
+    loaded = BoundaryElementContact(surface, sizes, TOLERANCE, eta)
     rows = list[dict[str, float]]()
     largest = [load_at(area, eta) for area in PEAKS]
     for number, p0 in enumerate(largest):
@@ -122,7 +122,7 @@ def solved(group: Any) -> dict[str, FloatArray]:
                 break
             rows.append(row(after, found, h_rms, number, p0, p0 * fraction, "unloaded"))
             rows[-1]["highest"] = float(after.traction.max()) / eta
-    elastic = Contact(surface, sizes, TOLERANCE)
+    elastic = BoundaryElementContact(surface, sizes, TOLERANCE)
     for force in np.geomspace(0.01 * largest[0], largest[-1], ELASTIC_LOADS)[::-1]:
         found = elastic.press(float(force))
         if found["area_raw"] * surface.size < FEWEST:
@@ -132,7 +132,7 @@ def solved(group: Any) -> dict[str, FloatArray]:
 
 
 def row(
-    contact: Contact,
+    contact: BoundaryElementContact,
     found: dict[str, float],
     h_rms: float,
     number: int,

@@ -17,8 +17,12 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.maps import matched
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.theories.calibrated.curves import Curve
-from mbma_tables.theories.calibrated.formulas import Constants, Law, Spectrum
+from mbma_tables.theories.calibrated.curves import CompressionCurve
+from mbma_tables.theories.calibrated.formulas import (
+    CalibratedConstants,
+    Spectrum,
+    SpectrumLaw,
+)
 from mbma_tables.theories.calibrated.map_curves import MapConstants, MapLaw
 from mbma_tables.theories.yielding import formulas as hardness
 
@@ -138,10 +142,12 @@ class Case(Simulated):
             self, force=self.force[kept], area=self.area[kept], u=self.u[kept]
         )
 
-    def law(self, constants: Constants) -> Law:
-        return Law(self.spectrum, self.h_max, constants)
+    def law(self, constants: CalibratedConstants) -> SpectrumLaw:
+        return SpectrumLaw(self.spectrum, self.h_max, constants)
 
-    def map_law(self, constants: Constants, map_constants: MapConstants) -> MapLaw:
+    def map_law(
+        self, constants: CalibratedConstants, map_constants: MapConstants
+    ) -> MapLaw:
         return MapLaw(
             self.own_spectrum,
             **self.curves,
@@ -160,8 +166,8 @@ class Capped(Simulated):
     """
 
     eta: float
-    law: Law
-    map_curve: Curve
+    law: SpectrumLaw
+    map_curve: CompressionCurve
     heights: hardness.BearingCurve
     curves: dict[str, tuple[FloatArray, FloatArray, FloatArray]]
     force: FloatArray
@@ -275,8 +281,8 @@ def capped(data: xr.Dataset) -> list[Capped]:
     for one, known in simulated(data):
         curves = curves_of(one)
         u = known.h_max * LEVELS[:-1]
-        law = Law(known.spectrum, known.h_max)
-        by_map = Curve(MapLaw(known.own_spectrum, **curves), known.h_max)
+        law = SpectrumLaw(known.spectrum, known.h_max)
+        by_map = CompressionCurve(MapLaw(known.own_spectrum, **curves), known.h_max)
         heights = hardness.BearingCurve(curves["mean_height"], known.h_max)
         force, _, stiffness = by_map.answer(u)
         levels = {

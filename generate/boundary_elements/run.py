@@ -56,7 +56,9 @@ from mbma_tables.surfaces.maps import prepared as treated_map
 from mbma_tables.surfaces.treatment import Treated, mirrored
 from mbma_tables.theories.dataset import FILE
 from mbma_tables.theories.simulated.boundary_elements import LOADS
-from mbma_tables.theories.simulated.boundary_elements import Contact as YieldingContact
+from mbma_tables.theories.simulated.boundary_elements import (
+    BoundaryElementContact as YieldingContact,
+)
 from mbma_tables.theories.simulated.map_gaps import OPEN_SHARES
 
 TEXTS = tomllib.loads(

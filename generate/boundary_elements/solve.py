@@ -293,7 +293,9 @@ def simulate_capped(recipe: Recipe) -> dict[str, Any]:
     forces = np.array([[load_at(area, eta) for area in AREAS] for eta in HARDNESSES])
     found = []
     for eta, loads in zip(HARDNESSES, forces, strict=True):
-        contact = boundary_elements.Contact(surface, recipe.sizes, hardness=eta)
+        contact = boundary_elements.BoundaryElementContact(
+            surface, recipe.sizes, hardness=eta
+        )
         results = [
             contact.press(force)
             | {"frozen_stiffness": contact.frozen_stiffness() * h_rms}
@@ -311,7 +313,9 @@ def solve_flow(recipe: Recipe) -> dict[str, Any]:
     contact: Any = Contact(surface, recipe.sizes)
     loads: tuple[float, ...] = FEW_LOADS if recipe.points >= LARGE else FLOW_LOADS
     if recipe.kind == "yielded":
-        contact = boundary_elements.Contact(surface, recipe.sizes, hardness=recipe.shape)
+        contact = boundary_elements.BoundaryElementContact(
+            surface, recipe.sizes, hardness=recipe.shape
+        )
         loads = tuple(load_at(area, recipe.shape) for area in FLOW_AREAS)
     rows = list[dict[str, float]]()
     flows = list[FloatArray]()
@@ -332,7 +336,9 @@ def solve_gaps(recipe: Recipe) -> dict[str, Any]:
     """Contact and distribution of gaps of one surface: lengths in h_rms, force in A0 E* g."""
     surface, _, known = prepared(heights(recipe), recipe.sizes, recipe.q0)
     h_rms = float(surface.std())
-    contact = boundary_elements.Contact(surface, recipe.sizes, GAP_TOLERANCE)
+    contact = boundary_elements.BoundaryElementContact(
+        surface, recipe.sizes, GAP_TOLERANCE
+    )
     forces = [load_at(area, np.inf) for area in AREAS]
     rows = list[dict[str, float]]()
     quantiles = list[FloatArray]()
@@ -365,7 +371,9 @@ def simulate_wide(recipe: Recipe, folder: pathlib.Path) -> dict[str, Any]:
     if path.exists():
         with np.load(path, allow_pickle=False) as content:
             found = dict(content)
-    contact = boundary_elements.Contact(surface, recipe.sizes, WIDE_TOLERANCE)
+    contact = boundary_elements.BoundaryElementContact(
+        surface, recipe.sizes, WIDE_TOLERANCE
+    )
     for force in WIDE_LOADS:
         if force in found["force"]:
             continue

@@ -186,7 +186,9 @@ def yielded(part: Part) -> dict[str, FloatArray]:
         # between the load at which all that touches yields and the elastic one
         force[k] = ((hardness * np.array(HARD_AREAS)) ** -2 + elastic**-2) ** -0.5
         # the truth
-        engine = boundary_elements.Contact(values, values.shape, hardness=hardness)
+        engine = boundary_elements.BoundaryElementContact(
+            values, values.shape, hardness=hardness
+        )
         for place, load in enumerate(force[k].tolist()):
             row = engine.press(load)
             share = row["area_yielded"] / row["area"]

@@ -29,7 +29,7 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import MbmaError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.treatment import mirrored
-from mbma_tables.theories.simulated.boundary_elements import Contact
+from mbma_tables.theories.simulated.boundary_elements import BoundaryElementContact
 from mbma_tables.theories.simulated.own_map import refined
 from mbma_tables.theories.simulated.reynolds import flow_tensor
 
@@ -71,7 +71,7 @@ def pressed(
     """`QUANTITIES` at pressures over E*, by Tamaas or on a finer grid; NaN for flow not solved."""
     mean_free = heights - heights.mean()
     sizes = (float(POINTS), float(POINTS))
-    engine: Tamaas | Contact
+    engine: Tamaas | BoundaryElementContact
     if times == 1:
         whole = mean_free if periodic else mirrored(mean_free)
         side = (1.0 if periodic else 2.0) * POINTS
@@ -79,7 +79,9 @@ def pressed(
     else:
         for _ in range(times // 2):
             mean_free = refined(mean_free, not periodic)
-        engine = Contact(mean_free, sizes, TOLERANCE, mirrored=not periodic)
+        engine = BoundaryElementContact(
+            mean_free, sizes, TOLERANCE, mirrored=not periodic
+        )
     rows = []
     for pressure in pressures.tolist():
         found = engine.press(pressure)

@@ -31,7 +31,7 @@ from mbma_tables.tables.reader import read_table
 from mbma_tables.tables.schema import ISLAND4D, KINDS, UNIVERSAL, TableContent
 from mbma_tables.theories import THEORIES
 from mbma_tables.theories.mbma.closed_form_certificates import CERTIFICATES, RANGES
-from mbma_tables.theories.mbma.closed_forms import FUNCTIONS, Function
+from mbma_tables.theories.mbma.closed_forms import FUNCTIONS, ClosedForm
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -172,7 +172,7 @@ def _where(condition: sympy.Basic, a: sympy.Expr, b: sympy.Expr) -> sympy.Piecew
     return sympy.Piecewise((a, condition), (b, True))
 
 
-def expressions(function: Function) -> dict[str, sympy.Expr]:
+def expressions(function: ClosedForm) -> dict[str, sympy.Expr]:
     """The steps of a closed form as sympy expressions.
 
     Their whole numbers and fractions are exact.
@@ -188,7 +188,7 @@ def expressions(function: Function) -> dict[str, sympy.Expr]:
     return exact
 
 
-def latex_steps(function: Function) -> Iterator[str]:
+def latex_steps(function: ClosedForm) -> Iterator[str]:
     """One equation a step, in the order in which they are evaluated.
 
     Polynomials are without Horner's brackets.

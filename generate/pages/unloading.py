@@ -15,7 +15,9 @@ from generate.unloading_fit import CLASSES, LIGHT, left_out, ratios, rms
 from mbma_tables import Bodies, Joint, Surface, contact
 from mbma_tables.common.plots import new_figure
 from mbma_tables.theories import Simulated
-from mbma_tables.theories.simulated.boundary_elements import Contact as BoundaryElements
+from mbma_tables.theories.simulated.boundary_elements import (
+    BoundaryElementContact as BoundaryElements,
+)
 from mbma_tables.theories.yielding.unloading import ratio_scatter
 
 if TYPE_CHECKING:

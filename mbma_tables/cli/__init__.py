@@ -57,7 +57,7 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     click.echo(f"mbma: warning: {visible(' '.join(str(message).split()))}", err=True)
 
 
-class Program(click.Group):
+class CommandGroup(click.Group):
     """A group of commands whose expected errors end in a short message."""
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **extra: Any) -> Any:
@@ -88,7 +88,7 @@ class Program(click.Group):
 
 @click.group(
     "mbma",
-    cls=Program,
+    cls=CommandGroup,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

@@ -72,5 +72,9 @@ class NotSelfAffineError(MbmaError, ValueError):
     """A measured map or spectrum that is not a self-affine surface; the message has the reason."""
 
 
+class UncertifiedError(MbmaError):
+    """A table that broke a physical check or missed its target, or a function for which the target cannot be reached."""
+
+
 class TableFileError(MbmaError, OSError):
     """A table file that cannot be used: unreadable, damaged, edited, of another format or kind."""

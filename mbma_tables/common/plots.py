@@ -45,7 +45,7 @@ def leakage_label(unit: str) -> str:
 
 
 @dataclasses.dataclass(frozen=True)
-class Curve:
+class DrawnCurve:
     """One line of a picture; arrays of one length, NaN where a scatter is not known."""
 
     label: str  # in the legend
@@ -131,7 +131,7 @@ def number_ticks(axes: Axes) -> None:
 
 
 def draw_compression(
-    curves: Sequence[Curve],
+    curves: Sequence[DrawnCurve],
     title: str = "",
     pressure_label: str = PRESSURE_LABEL,
     gap_label: str = GAP_LABEL,

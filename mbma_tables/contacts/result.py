@@ -23,7 +23,7 @@ from mbma_tables.common.arguments import (
 from mbma_tables.common.display import Displayed, Variable, quantity, shown
 from mbma_tables.common.errors import InputError, MissingError
 from mbma_tables.common.plots import (
-    Curve,
+    DrawnCurve,
     Line,
     draw_compression,
     new_figure,
@@ -642,7 +642,7 @@ class Contact(State, Displayed):
             )
         return lines
 
-    def curve(self, leakage: bool = False) -> Curve:
+    def curve(self, leakage: bool = False) -> DrawnCurve:
         """The line that plots draw, for one surface at several separations; optionally with its leakage."""
         if np.size(self.pressure) < 2 or self.surface.shape != ():
             raise InputError(
@@ -659,7 +659,7 @@ class Contact(State, Displayed):
         if leakage:
             fields += [self.leakage.K, self.leakage.scatter]
         label = theory_label(self.theory) + (f", {self.variant}" if self.variant else "")
-        return Curve(label, *(np.ravel(field)[order] for field in fields))
+        return DrawnCurve(label, *(np.ravel(field)[order] for field in fields))
 
     def map(self) -> ContactMap:
         """Pressure, gap and contact at every point of the surface's map, simulated on its full grid at this pressure.
@@ -705,7 +705,7 @@ class Contact(State, Displayed):
         stretched = side_x * gradient / scale, side_y * gradient / scale
         cap = float(self.bodies.hardness) / modulus / gradient
         is_mirrored = not treated.periodic
-        engine = boundary_elements.Contact(
+        engine = boundary_elements.BoundaryElementContact(
             heights / scale, stretched, pressing.TOLERANCE, cap, is_mirrored
         )
         with progress("boundary elements"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import inspect
 import itertools
 import os
@@ -41,7 +42,7 @@ from mbma_tables.design.joint import FACES, PLAIN_STRESS, Joint
 from mbma_tables.design.row_files import (
     Chunk,
     Rows,
-    Source,
+    RowSource,
     csv_lines,
     is_csv,
     open_writer,
@@ -500,7 +501,7 @@ def _with(common: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]
 
 
 def designs_of(
-    source: Source,
+    source: RowSource,
     common: Mapping[str, Any],
     keep: Sequence[str] = (),
     path: pathlib.Path = pathlib.Path("joint"),
@@ -661,51 +662,44 @@ def batch(
         return _written(source, table, names, target, workers)
 
 
-@dataclasses.dataclass(frozen=True)
-class Task:
-    """What is done with each chunk of a table, here or in another process."""
-
-    designs: Designs
-    names: Sequence[str]  # of the quantities
-    units: Mapping[str, str]  # of all columns, in the order in which they are written
-    as_text: bool  # whether rows are lines of CSV
-
-    def __call__(self, chunk: Chunk) -> Done:
-        """Compute a chunk."""
-        units = {name: self.units[name] for name in self.names}
-        return self.done(chunk, *answered(self.designs, chunk, self.names, units))
-
-    def done(
-        self, chunk: Chunk, answers: Answers, numbers: Mapping[str, FloatArray]
-    ) -> Done:
-        """A chunk with its answers, as it is written."""
-        columns = dict(chunk.columns)
-        if not self.as_text:
-            columns |= {
-                name: each / _factor(self.designs, name)
-                for name, each in numbers.items()
-                if self.designs.draws is None or isinstance(columns[name], np.ndarray)
-            }
-        columns |= answers.values
-        columns |= {VALID: answers.valid, REASON: answers.reasons}
-        rows = csv_lines(columns, list(self.units)) if self.as_text else columns
-        refused = answers.valid.count("")
-        not_valid = answers.valid.count("no")
-        return Done(rows, chunk.rows, refused, not_valid, chunk.done)
+def _computed(
+    designs: Designs,
+    names: Sequence[str],
+    units: Mapping[str, str],
+    as_text: bool,
+    chunk: Chunk,
+) -> tuple[Rows, Summary, float]:
+    """The rows of a chunk as they are written, how many, and the share of the table up to its end."""
+    of_names = {name: units[name] for name in names}
+    found = answered(designs, chunk, names, of_names)
+    return _as_written(designs, units, as_text, chunk, *found)
 
 
-class Done(NamedTuple):
-    """A chunk with its answers, as it is written, and how many rows it had."""
-
-    written: Rows
-    rows: int
-    refused: int
-    not_valid: int
-    share: float  # of the table up to its end
+def _as_written(
+    designs: Designs,
+    units: Mapping[str, str],
+    as_text: bool,
+    chunk: Chunk,
+    answers: Answers,
+    numbers: Mapping[str, FloatArray],
+) -> tuple[Rows, Summary, float]:
+    """A chunk with its answers; `units` has all columns in their order, rows of text are lines of CSV."""
+    columns = dict(chunk.columns)
+    if not as_text:
+        columns |= {
+            name: each / _factor(designs, name)
+            for name, each in numbers.items()
+            if designs.draws is None or isinstance(columns[name], np.ndarray)
+        }
+    columns |= answers.values
+    columns |= {VALID: answers.valid, REASON: answers.reasons}
+    rows = csv_lines(columns, list(units)) if as_text else columns
+    counts = Summary(chunk.rows, answers.valid.count(""), answers.valid.count("no"))
+    return rows, counts, chunk.done
 
 
 def _written(
-    source: Source,
+    source: RowSource,
     designs: Designs,
     names: Sequence[str],
     target: pathlib.Path,
@@ -723,17 +717,19 @@ def _written(
         unit = of_first.get(name) or registry.get(name).unit_in(designs.units)
         units |= {f"{name}{end}": unit for end in ends}
     units |= dict.fromkeys((VALID, REASON), "")
-    task = Task(designs, names, units, is_csv(target))
+    as_text = is_csv(target)
+    task = functools.partial(_computed, designs, names, units, as_text)
+    written = _as_written(designs, units, as_text, first, answers, numbers)
 
     rows = refused = not_valid = 0
     with open_writer(target, units) as write, crew(workers) as run:
         others = run(task, ((chunk,) for chunk in source.chunks))
-        for done in itertools.chain([task.done(first, answers, numbers)], others):
-            write(done.written)
-            rows += done.rows
-            refused += done.refused
-            not_valid += done.not_valid
-            doing(f"{rows:,} rows, {done.share:.0%} of the table")
+        for lines, counts, share in itertools.chain([written], others):
+            write(lines)
+            rows += counts.rows
+            refused += counts.refused
+            not_valid += counts.not_valid
+            doing(f"{rows:,} rows, {share:.0%} of the table")
     return Summary(rows, refused, not_valid)
 
 

@@ -209,7 +209,7 @@ class Derivatives:
 
 
 @dataclasses.dataclass
-class _Table:
+class _SlopeTable:
     """Differences of rows of quantities by each direction, in a last axis of contacts."""
 
     slopes: FloatArray  # (directions, quantities, contacts)
@@ -275,7 +275,7 @@ def _named(
     }
 
 
-def _at_given(table: _Table, count: int, is_held: bool) -> _Table:
+def _at_given(table: _SlopeTable, count: int, is_held: bool) -> _SlopeTable:
     """Derivatives at the quantity held fixed, from those at given gaps; the last is by that quantity."""
     if not is_held:
         return table
@@ -299,14 +299,14 @@ def _at_given(table: _Table, count: int, is_held: bool) -> _Table:
     # a one-sided derivative by the gap makes all of them one-sided
     own = table.sides[:-1]
     sides = np.where(own == 0, np.abs(table.sides[-1]), own)
-    return _Table(
+    return _SlopeTable(
         all_slopes, all_errors, np.concatenate([sides, -table.sides[-1:]]).astype(np.int8)
     )
 
 
 def _add_ratio(
     described: Described,
-    table: _Table,
+    table: _SlopeTable,
     names: Sequence[str],
     directions: Sequence[str],
     pressed: Contact,
@@ -362,10 +362,10 @@ class _Differences:
 
     def of(
         self, columns: Mapping[str, FloatArray], values: FloatArray, scale: FloatArray
-    ) -> _Table:
+    ) -> _SlopeTable:
         """All differences, in blocks of contacts."""
         count = values.shape[1]
-        table = _Table(
+        table = _SlopeTable(
             np.empty((len(self.directions), len(self.names), count)),
             np.empty((len(self.directions), len(self.names), count)),
             np.zeros((len(self.directions), count), np.int8),
@@ -414,7 +414,7 @@ class _Differences:
         values: FloatArray,
         steps: FloatArray,
         sides: NDArray[Any] | None = None,
-    ) -> _Table:
+    ) -> _SlopeTable:
         """Differences of a block: central where there is room on both sides."""
         if sides is None:
             sides = self._sides(part, steps)
@@ -426,7 +426,7 @@ class _Differences:
         (below, above), base = self._at_pairs(part, central, step, CENTRAL, with_base)
         if with_base:
             values = base
-        table = _Table(
+        table = _SlopeTable(
             np.empty((len(self.directions), *values.shape)),
             np.empty((len(self.directions), *values.shape)),
             sides,
@@ -482,7 +482,7 @@ class _Differences:
 
     def _one_sided(
         self,
-        table: _Table,
+        table: _SlopeTable,
         part: Mapping[str, FloatArray],
         pairs: tuple[NDArray[np.intp], ...],
         step: FloatArray,
@@ -502,7 +502,7 @@ class _Differences:
 
     def _look_again(
         self,
-        table: _Table,
+        table: _SlopeTable,
         part: Mapping[str, FloatArray],
         pairs: tuple[NDArray[np.intp], ...],
         step: FloatArray,
@@ -532,14 +532,14 @@ class _Differences:
 
     def _to_one_side(
         self,
-        table: _Table,
+        table: _SlopeTable,
         part: Mapping[str, FloatArray],
         pairs: tuple[NDArray[np.intp], ...],
         step: FloatArray,
         found: FloatArray,
     ) -> None:
         """Write derivatives of the side in contact to the table, where both sides differ but each is smooth."""
-        sides = [_Side(found[2::-1], -step), _Side(found[3:], step)]
+        sides = [_OneSided(found[2::-1], -step), _OneSided(found[3:], step)]
         size = np.abs(found).max(axis=0)
         jumps = ~(np.abs(sides[0].limit - sides[1].limit) <= JUMP * size)
         ends = sides[0].is_empty | sides[1].is_empty
@@ -565,7 +565,7 @@ class _Differences:
 
     def _over_more(
         self,
-        table: _Table,
+        table: _SlopeTable,
         part: Mapping[str, FloatArray],
         pairs: tuple[NDArray[np.intp], ...],
         step: FloatArray,
@@ -594,7 +594,7 @@ class _Differences:
 
     def _at_an_end(
         self, part: Mapping[str, FloatArray], values: FloatArray, steps: FloatArray
-    ) -> _Table:
+    ) -> _SlopeTable:
         """Differences of one contact, each direction towards the side on which there are contacts."""
         sides = self._sides(part, steps)
         tables = []
@@ -606,14 +606,14 @@ class _Differences:
                 else [np.full((1, 1), sign, np.int8) for sign in (0, 1, -1)]
             )
             tables.append(_first(alone, part, values, steps[k : k + 1], tried))
-        return _Table(
+        return _SlopeTable(
             np.concatenate([each.slopes for each in tables]),
             np.concatenate([each.errors for each in tables]),
             np.concatenate([each.sides for each in tables]),
         )
 
 
-class _Side:
+class _OneSided:
     """One side of a point: three values of quantities at one, two and three steps."""
 
     def __init__(self, found: FloatArray, step: FloatArray) -> None:
@@ -639,7 +639,7 @@ def _first(
     values: FloatArray,
     steps: FloatArray,
     tried: Sequence[NDArray[Any]],
-) -> _Table:
+) -> _SlopeTable:
     """The differences towards the first of several sides on which there are contacts."""
     for sides in tried[:-1]:
         try:

@@ -38,7 +38,7 @@ class Chunk(NamedTuple):
         return len(next(iter(self.columns.values())))
 
 
-class Source(NamedTuple):
+class RowSource(NamedTuple):
     """A table that is read in chunks."""
 
     units: dict[str, str]  # of each column, "" where its header has none
@@ -56,7 +56,7 @@ def header_of(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
-def _source(path: object, headers: Sequence[str], chunks: Iterator[Chunk]) -> Source:
+def _source(path: object, headers: Sequence[str], chunks: Iterator[Chunk]) -> RowSource:
     """A source with these headers, each once."""
     names: dict[str, str] = {}
     units: dict[str, str] = {}
@@ -69,11 +69,11 @@ def _source(path: object, headers: Sequence[str], chunks: Iterator[Chunk]) -> So
             raise InputError(f"{path}: two columns are named {name!r}")
         names[name] = header.strip()
         units[name] = unit
-    return Source(units, names, chunks)
+    return RowSource(units, names, chunks)
 
 
 @contextlib.contextmanager
-def opened(path: pathlib.Path) -> Iterator[Source]:
+def opened(path: pathlib.Path) -> Iterator[RowSource]:
     """A table by the end of its name: .csv, .parquet or .nc; "-" is CSV from standard input."""
     kind = path.suffix
     if str(path) != "-" and not path.is_file():
@@ -100,7 +100,7 @@ def opened(path: pathlib.Path) -> Iterator[Source]:
         raise InputError(f"{path}: tables are .csv, .parquet or .nc")
 
 
-def _csv_source(path: pathlib.Path, stream: TextIO, size: int) -> Source:
+def _csv_source(path: pathlib.Path, stream: TextIO, size: int) -> RowSource:
     read = [0]
     rows = csv.reader(itertools.chain.from_iterable(_counted(stream, read)))
     headers = next(rows, None)
@@ -156,7 +156,7 @@ def _cells(column: Any) -> Any:
     return ["" if entry is None else str(entry) for entry in array.tolist()]
 
 
-def _parquet_source(path: pathlib.Path, file: Any) -> Source:
+def _parquet_source(path: pathlib.Path, file: Any) -> RowSource:
     headers = file.schema_arrow.names
     names = list(_source(path, headers, iter(())).headers)
     total = max(file.metadata.num_rows, 1)
@@ -174,7 +174,7 @@ def _parquet_source(path: pathlib.Path, file: Any) -> Source:
     return _source(path, headers, chunks())
 
 
-def _netcdf_source(path: pathlib.Path, data: Any) -> Source:
+def _netcdf_source(path: pathlib.Path, data: Any) -> RowSource:
     with HDF5_LOCK:
         along = [v for v in data.variables.values() if v.ndim == 1]
         dimensions = {v.dimensions[0] for v in along}

@@ -74,7 +74,7 @@ def plane_basis(nodes: int) -> Basis:
     )
 
 
-class Solved(NamedTuple):
+class PressedBody(NamedTuple):
     """Solution at one approach: radius of the loaded area, and values at its nodes."""
 
     radius: float
@@ -133,14 +133,14 @@ class Body:
         stiffness = np.where(apart, 0.0, k)
         return pressure / self.law.E_star, stiffness / self.law.E_star
 
-    def integral(self, at: Solved, values: FloatArray) -> float:
+    def integral(self, at: PressedBody, values: FloatArray) -> float:
         """Over the contact, of a cylinder per length."""
         shares = np.asarray(at.basis.root_weights) ** 2
         return float(np.sum(shares * values)) * (
             2 * at.radius if self.plane else math.pi * at.radius**2
         )
 
-    def between(self, at: Solved, values: FloatArray, t: FloatArray) -> FloatArray:
+    def between(self, at: PressedBody, values: FloatArray, t: FloatArray) -> FloatArray:
         """Values at the nodes, at radii of t times that of the contact, t up to 1."""
         degrees = np.arange(len(values)) * (2 if self.plane else 1)
         series = np.zeros(degrees[-1] + 1)
@@ -149,7 +149,7 @@ class Body:
         )
         return np.asarray(legendre.legval(t if self.plane else 2 * t**2 - 1, series))
 
-    def _newton(self, approach: float, radius: float, nodes: int) -> Solved:
+    def _newton(self, approach: float, radius: float, nodes: int) -> PressedBody:
         pressures = plane_basis(nodes) if self.plane else basis(nodes)
         root = pressures.root_weights
         operator = radius * pressures.operator
@@ -172,9 +172,9 @@ class Body:
                 f"the half-space at the approach {approach:.6g} is not found in {STEPS} steps"
             )
         u = rigid + w / root
-        return Solved(radius, pressures, u, self.layer(u)[0], jacobian, math.inf)
+        return PressedBody(radius, pressures, u, self.layer(u)[0], jacobian, math.inf)
 
-    def solved(self, approach: float, rtol: float) -> Solved:
+    def solved(self, approach: float, rtol: float) -> PressedBody:
         """The contact at an approach.
 
         The last number of nodes changes the force by a relative `rtol` at most.
@@ -198,7 +198,7 @@ class Body:
             )
         return solution._replace(error=error)
 
-    def quantities(self, at: Solved) -> tuple[float, float, float]:
+    def quantities(self, at: PressedBody) -> tuple[float, float, float]:
         """Force over E*, its derivative by the approach over E*, and the real area."""
         middle = finite_array("mean_separation", at.u.min())
         low = self.ends[0]

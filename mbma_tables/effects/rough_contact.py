@@ -30,7 +30,7 @@ from mbma_tables.effects.force_law import (
     RTOL,
     Body,
     ForceLaw,
-    Solved,
+    PressedBody,
     force_law,
     forces,
     units_of,
@@ -319,7 +319,7 @@ def pressed(body: Body, wanted: FloatArray) -> RoughContact:
     )  # fmt: skip
 
 
-def _trust(body: Body, solution: Solved, force: float) -> tuple[float, list[str]]:
+def _trust(body: Body, solution: PressedBody, force: float) -> tuple[float, list[str]]:
     """Standard deviation of ln F by that of the law, and reasons against the law.
 
     The law's deviation is alike at all places.

@@ -51,22 +51,6 @@ AREA_SOURCE = "no nominal area is given; h_max depends on its logarithm alone"
 STEP = "from_drawing"
 
 
-@dataclasses.dataclass(frozen=True)
-class Drawing:
-    """Arguments of `Surface.from_roughness`, of which some are ranges that were assumed.
-
-    Attributes
-    ----------
-    numbers : dict
-        All arguments but the highest point, as they would be typed.
-    assumed : dict
-        Of each number that the drawing does not state, its range and the source of it.
-    """
-
-    numbers: dict[str, Any]
-    assumed: dict[str, str]
-
-
 def is_drawing(part: Any) -> bool:
     """Whether numbers of a face name a process and leave others out, which are then assumed."""
     if not isinstance(part, Mapping) or "map" in part or part.get("process") is None:
@@ -76,7 +60,7 @@ def is_drawing(part: Any) -> bool:
     return not (has_band and "hurst" in known)
 
 
-def drawing_of(given: Mapping[str, Any]) -> Drawing:
+def drawing_of(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:
     """The numbers of a drawing with ranges in place of those that it does not state.
 
     Parameters
@@ -84,6 +68,13 @@ def drawing_of(given: Mapping[str, Any]) -> Drawing:
     given : mapping
         Arguments of `Surface.from_roughness`, or the height "Rz". Each is a number, or a
         distribution.
+
+    Returns
+    -------
+    numbers : dict
+        Arguments of `Surface.from_roughness` but the highest point, as they would be typed.
+    assumed : dict
+        Of each number that the drawing does not state, its range and the source of it.
 
     Raises
     ------
@@ -93,10 +84,10 @@ def drawing_of(given: Mapping[str, Any]) -> Drawing:
     Examples
     --------
     >>> from mbma_tables.surfaces.drawing import drawing_of
-    >>> face = drawing_of({"Ra": "1.6 um", "process": "milled"})
-    >>> face.numbers["longest"], face.numbers["shortest"]
+    >>> numbers, assumed = drawing_of({"Ra": "1.6 um", "process": "milled"})
+    >>> numbers["longest"], numbers["shortest"]
     ('80..800 um log', '2.5..20 um log')
-    >>> face.assumed["shortest"]
+    >>> assumed["shortest"]
     '2.5..20 um log: lambda_s = 2.5 um, the default of ISO 21920-3 for this Ra, or the resolution of a coarser stylus'
     """
     numbers = {name: value for name, value in given.items() if value is not None}
@@ -142,7 +133,7 @@ def drawing_of(given: Mapping[str, Any]) -> Drawing:
             f"{row['area_spread']} of ln area, {row['gap_spread']} of ln gap and "
             f"{row['stiffness_spread']} of ln stiffness"
         )
-    return Drawing(numbers, assumed)
+    return numbers, assumed
 
 
 def _micrometres(name: str, value: Any, unit: str | None) -> float:
@@ -249,19 +240,19 @@ def with_area(numbers: dict[str, Any], assumed: dict[str, str]) -> None:
 
 def surface_of_drawing(surface_type: Any, given: Mapping[str, Any]) -> Any:
     """The surface of the middle of every range of a drawing; see `Surface.from_drawing`."""
-    drawing = drawing_of(given)
-    with_area(drawing.numbers, drawing.assumed)
-    inputs = dict(distributions_in(drawing.numbers))
-    middle = with_numbers(drawing.numbers, of_all(inputs, lambda each: each.median))
+    numbers, assumed = drawing_of(given)
+    with_area(numbers, assumed)
+    inputs = dict(distributions_in(numbers))
+    middle = with_numbers(numbers, of_all(inputs, lambda each: each.median))
     surface = surface_type.from_roughness(**middle)
-    if not drawing.assumed:
+    if not assumed:
         return surface
     record = {
         "step": STEP,
         "given": {name: value for name, value in given.items() if value is not None},
-        "assumed": [f"{name} {text}" for name, text in drawing.assumed.items()],
+        "assumed": [f"{name} {text}" for name, text in assumed.items()],
         "not_valid": (
-            f"{', '.join(drawing.assumed)} of the drawing are ranges, of which this is the "
+            f"{', '.join(assumed)} of the drawing are ranges, of which this is the "
             "middle: uncertainty(...) and Joint(...) have the quantities of the whole ranges"
         ),
     }
@@ -273,8 +264,7 @@ def entries_of(surface: Any) -> tuple[Any, dict[str, str]]:
     given = surface if is_drawing(surface) else record_of(surface)
     if given is None:
         return surface, {}
-    drawing = drawing_of(given)
-    return drawing.numbers, drawing.assumed
+    return drawing_of(given)
 
 
 def record_of(surface: Any) -> Mapping[str, Any] | None:

@@ -94,25 +94,6 @@ class PowerLaw:
     criterion: float
 
 
-@dataclasses.dataclass(frozen=True)
-class _Line:
-    """A weighted straight line: y = intercept + slope x."""
-
-    intercept: float
-    slope: float
-    chi2: float
-    spread: float  # weighted, of x
-
-
-@dataclasses.dataclass(frozen=True)
-class _RollOff:
-    """What precedes a power law: nothing, a flat or a rising line."""
-
-    chi2: float
-    parameters: int  # with the break
-    level: float | None  # of ln C, if flat
-
-
 def log_bins(q: FloatArray, C: FloatArray, counts: FloatArray) -> Bins:
     """Averages of C over logarithmic bins of the wavenumber, weighted by independent samples."""
     # 20 bins a decade, 12% wide: accuracy of a break's position; bins of a dense spectrum
@@ -134,8 +115,10 @@ def log_bins(q: FloatArray, C: FloatArray, counts: FloatArray) -> Bins:
     return Bins(np.exp(log_q), log_c, 1 / (1 / total + SCATTER**2))
 
 
-def _straight(x: FloatArray, bins: Bins, start: int, stop: int) -> _Line:
-    """Weighted line through bins[start:stop]."""
+def _straight(
+    x: FloatArray, bins: Bins, start: int, stop: int
+) -> tuple[float, float, float, float]:
+    """Weighted line through bins[start:stop]: intercept, slope, chi^2, and spread of x."""
     weight = bins.weight[start:stop]
     x = x[start:stop]
     y = bins.log_c[start:stop]
@@ -145,22 +128,25 @@ def _straight(x: FloatArray, bins: Bins, start: int, stop: int) -> _Line:
     slope = float(weight @ ((x - x_mean) * (y - y_mean))) / spread
     intercept = float(y_mean - slope * x_mean)
     chi2 = float(weight @ (y - intercept - slope * x) ** 2)
-    return _Line(intercept, slope, chi2, spread)
+    return intercept, slope, chi2, spread
 
 
-def _roll_off(x: FloatArray, bins: Bins, stop: int) -> _RollOff:
-    """A flat or else a rising line through bins[:stop]."""
+def _roll_off(x: FloatArray, bins: Bins, stop: int) -> tuple[float, int, float | None]:
+    """What precedes a power law in bins[:stop], nothing, a flat or a rising line.
+
+    Its chi^2, its number of parameters with the break, and its level of ln C if it is flat.
+    """
     if stop == 0:
-        return _RollOff(0.0, 0, None)
+        return 0.0, 0, None
     weight = bins.weight[:stop]
     y = bins.log_c[:stop]
     level = float(np.average(y, weights=weight))
     flat = float(weight @ (y - level) ** 2)
-    line = _straight(x, bins, 0, stop)
+    _, slope, chi2, _ = _straight(x, bins, 0, stop)
     # the slope is worth its parameter
-    if line.slope > 0 and line.chi2 + math.log(len(x)) < flat:
-        return _RollOff(line.chi2, 3, None)
-    return _RollOff(flat, 2, level)
+    if slope > 0 and chi2 + math.log(len(x)) < flat:
+        return chi2, 3, None
+    return flat, 2, level
 
 
 def find_law(bins: Bins, unit: float, breaks: bool) -> PowerLaw:
@@ -195,7 +181,7 @@ def _possible_laws(bins: Bins, unit: float, breaks: bool) -> list[PowerLaw]:
         stops += range(MIN_POINTS, count - MIN_PIECE + 1)
     departures = {count: 0.0}
     for stop in stops[1:]:
-        departures[stop] = _straight(x, bins, stop, count).chi2
+        _, _, departures[stop], _ = _straight(x, bins, stop, count)
     laws = []
     for start in starts:
         roll_off = _roll_off(x, bins, start)
@@ -212,24 +198,27 @@ def _law(
     bins: Bins,
     start: int,
     stop: int,
-    roll_off: _RollOff,
+    roll_off: tuple[float, int, float | None],
     departure: float,
 ) -> PowerLaw:
     """The power law through bins[start:stop], `departure` being chi^2 of the bins after it."""
-    line = _straight(x, bins, start, stop)
+    log_k, slope, misfit_of_law, spread = _straight(x, bins, start, stop)
+    misfit_before, parameters_before, level = roll_off
     count = len(bins.q)
     after = count - stop
     # each piece by its own scatter, or a tail that no line fits would hide the misfit of
     # the law; the scatter expected anyway, 1, is not fitted
-    pieces = ((roll_off.chi2, start), (line.chi2, stop - start), (departure, after))
+    pieces = (
+        (misfit_before, start),
+        (misfit_of_law, stop - start),
+        (departure, after),
+    )
     terms = [size * math.log(1 + misfit / size) for misfit, size in pieces if size]
     information = sum(terms)
-    parameters = 2 + roll_off.parameters + (3 if after else 0)
+    parameters = 2 + parameters_before + (3 if after else 0)
     information += parameters * math.log(count)
-    error = math.sqrt(line.chi2 / (stop - start - 2) / line.spread)
-    return PowerLaw(
-        start, stop, line.intercept, -line.slope, error, roll_off.level, information
-    )
+    error = math.sqrt(misfit_of_law / (stop - start - 2) / spread)
+    return PowerLaw(start, stop, log_k, -slope, error, level, information)
 
 
 def _band_of(

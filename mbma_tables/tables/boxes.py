@@ -17,7 +17,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.errors import MbmaError
+from mbma_tables.common.errors import UncertifiedError
 from mbma_tables.common.shared import shared
 
 PENDING, POLYNOMIAL, NO_ANSWER = -3, -1, -2  # of boxes that are not halved; as in mbma.h
@@ -39,10 +39,6 @@ SLOWEST = 0.98  # ratio of one term to the one before, for estimates of what is 
 MOST_ROUNDS = 8  # of held-out points
 REPLAYED = 16  # held-out points of a piece that a file keeps
 ROUNDING = 1e-15
-
-
-class UnreachedError(MbmaError):
-    """A table that misses its target, or a function for which it cannot be reached."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -263,7 +259,7 @@ class Piece:
             self._decide(box, stored[:, start:end], stored[:, end:last])
             start = last
         if self.size > self.most:
-            raise UnreachedError(
+            raise UncertifiedError(
                 f"{self.most} coefficients do not reach the target; ask for a larger one, "
                 "a smaller range, or set max_coefficients"
             )
@@ -389,7 +385,7 @@ class Piece:
             some = np.flatnonzero(np.isfinite(errors).all(axis=0))[:REPLAYED]
             self.replayed = points[some], stored.T[some]
         elif self.round >= MOST_ROUNDS:
-            raise UnreachedError(
+            raise UncertifiedError(
                 f"after {MOST_ROUNDS} rounds of {self.held_out} held-out points the target "
                 "is still missed: the function is not smooth"
             )
@@ -438,7 +434,7 @@ class Piece:
         self.replayed = state["replayed_points"], state["replayed_values"]
 
 
-class UnsmoothError(UnreachedError):
+class UnsmoothError(UncertifiedError):
     """A place at which the function is not smooth, in coordinates on which boxes are halved."""
 
     def __init__(self, place: FloatArray) -> None:

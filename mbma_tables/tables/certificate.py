@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.common.errors import MbmaError
+from mbma_tables.common.errors import UncertifiedError
 from mbma_tables.common.workers import results
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.tables.configuration import Configuration
@@ -28,10 +28,6 @@ class Forecast(NamedTuple):
     islands: int  # to be solved
     seconds: float
     bytes: int
-
-
-class UncertifiedError(MbmaError):
-    """A table that broke a physical check or missed its target; it is not written."""
 
 
 def phi(X: FloatArray, mu: FloatArray, rtol: float, refinement: int = 1) -> FloatArray:

@@ -72,7 +72,7 @@ class FunctionAxis:
 
 
 @dataclasses.dataclass(frozen=True)
-class Output:
+class FunctionOutput:
     """A result of the function: how its error is measured, its unit."""
 
     name: str
@@ -117,7 +117,7 @@ class FunctionTable:
     Parameters
     ----------
     axes : tuple of FunctionAxis
-    outputs : tuple of Output
+    outputs : tuple of FunctionOutput
     arrays : dict
         Tree and polynomials, by the names of the file's variables.
     attributes : dict
@@ -129,7 +129,7 @@ class FunctionTable:
     def __init__(
         self,
         axes: tuple[FunctionAxis, ...],
-        outputs: tuple[Output, ...],
+        outputs: tuple[FunctionOutput, ...],
         arrays: Mapping[str, Any],
         attributes: Mapping[str, Any],
     ) -> None:
@@ -698,7 +698,9 @@ def table_in(dataset: netCDF4.Dataset) -> FunctionTable:
     values, attributes = own_content(dataset, KIND, FORMAT)
     try:
         axes = tuple(FunctionAxis(**entry) for entry in json.loads(attributes["axes"]))
-        outputs = tuple(Output(**entry) for entry in json.loads(attributes["outputs"]))
+        outputs = tuple(
+            FunctionOutput(**entry) for entry in json.loads(attributes["outputs"])
+        )
         for name in NUMBERS:  # what the attributes say, for other languages
             values.pop(name, None)
         points = values["conformance_x"], values["conformance_exact"]

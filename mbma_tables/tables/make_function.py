@@ -26,7 +26,7 @@ from typing import Any, cast
 import numpy as np
 
 from mbma_tables.common.arguments import FloatArray, nearest
-from mbma_tables.common.errors import InputError, TableFileError
+from mbma_tables.common.errors import InputError, TableFileError, UncertifiedError
 from mbma_tables.common.files import write_file
 from mbma_tables.common.netcdf import write_own
 from mbma_tables.common.toml_files import check, read_toml
@@ -38,7 +38,6 @@ from mbma_tables.tables.boxes import (
     Aim,
     Box,
     Piece,
-    UnreachedError,
     UnsmoothError,
     middle_of,
 )
@@ -46,8 +45,8 @@ from mbma_tables.tables.function_table import (
     FORMAT,
     KIND,
     FunctionAxis,
+    FunctionOutput,
     FunctionTable,
-    Output,
     checked,
     read_function_table,
 )
@@ -91,11 +90,11 @@ class Wanted:
     licence: str
     source: str
     axes: tuple[FunctionAxis, ...]
-    outputs: tuple[Output, ...]
+    outputs: tuple[FunctionOutput, ...]
     members: Members | None = None
 
     @property
-    def stored(self) -> tuple[Output, ...]:
+    def stored(self) -> tuple[FunctionOutput, ...]:
         """Outputs of the table's value and of the members that are stored beside it."""
         beside = 0 if self.members is None else len(self.members.stored)
         return self.outputs * (1 + beside)
@@ -110,7 +109,9 @@ class Wanted:
         """Inverse of `as_json`."""
         entries = json.loads(text)
         entries["axes"] = tuple(FunctionAxis(**axis) for axis in entries["axes"])
-        entries["outputs"] = tuple(Output(**output) for output in entries["outputs"])
+        entries["outputs"] = tuple(
+            FunctionOutput(**output) for output in entries["outputs"]
+        )
         if entries.get("members") is not None:
             entries["members"] = Members.from_json(entries["members"])
         return cls(**entries)
@@ -260,7 +261,7 @@ def wanted_of(
         for axis in axes:
             _require_axis(axis)
         outputs = tuple(
-            Output(name, **entry)
+            FunctionOutput(name, **entry)
             for name, entry in merged.get("outputs", {"value": {}}).items()
         )
         both = {axis.name for axis in axes} & {output.name for output in outputs}
@@ -572,7 +573,7 @@ def grow(
             piece.take(values)
         except UnsmoothError as fault:
             place = _in_x(wanted, fault.place[None])[0]
-            raise UnreachedError(
+            raise UncertifiedError(
                 f"{wanted.function} is not smooth at {_at(wanted, place)}: the target of "
                 f"{wanted.target:g} is not reached in boxes of 2^-{MOST_HALVINGS} of the range; ask for a "
                 'larger target, or set on_failure = "mark" to refuse lookups there'
@@ -636,7 +637,7 @@ def _attributes(wanted: Wanted, errors: FloatArray, excess: int) -> dict[str, st
     names = [output.name for output in wanted.outputs]
     members = () if wanted.members is None else wanted.members.stored
     if not len(answered):
-        raise UnreachedError(f"{wanted.function} has no value at any held-out point")
+        raise UncertifiedError(f"{wanted.function} has no value at any held-out point")
     statistics = {
         "largest_error": answered.max(axis=0),
         "p99_error": np.percentile(answered, 99, axis=0),
@@ -786,7 +787,7 @@ def make(
     ------
     InputError
         For a function that raises or returns no numbers, with the point.
-    UnreachedError
+    UncertifiedError
         If the target is not reached; what was found stays in the folder.
     """
     kept = Kept(folder_of(path), wanted)

@@ -20,6 +20,7 @@ from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
 from mbma_tables.common.arguments import FloatArray, filled
+from mbma_tables.common.errors import UncertifiedError
 from mbma_tables.core import core
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
@@ -29,7 +30,6 @@ from mbma_tables.tables.certificate import (
     CONFORMANCE_POINTS,
     Forecast,
     Kind,
-    UncertifiedError,
     conformance,
 )
 from mbma_tables.tables.island4d import (

@@ -10,6 +10,7 @@ from numpy.polynomial import chebyshev
 from scipy.stats import qmc
 
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import UncertifiedError
 from mbma_tables.common.workers import results
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
@@ -18,7 +19,6 @@ from mbma_tables.tables.certificate import (
     CONFORMANCE_POINTS,
     Forecast,
     Kind,
-    UncertifiedError,
     conformance,
     phi,
 )

@@ -23,7 +23,7 @@ FROM_ZERO = 0.25
 DECADE = 10.0  # least ratio of the ends of a scale of colours
 
 
-class Side(NamedTuple):
+class PictureAxis(NamedTuple):
     """An axis of the drawing: what is written on it, its scale, and the ends of the cells."""
 
     label: str
@@ -35,7 +35,7 @@ class Side(NamedTuple):
 class Cells(NamedTuple):
     """Cells of a table over its first axes, and the bounds on the error in each."""
 
-    sides: list[Side]  # one or two
+    sides: list[PictureAxis]  # one or two
     titles: list[str]  # of each result
     labels: list[str]  # what its bound is
     bounds: FloatArray  # (results, cells)
@@ -52,8 +52,8 @@ def _universal_cells(content: TableContent) -> Cells:
     # cells from mu = 0 end at the bottom of the logarithmic scale
     bottom = FROM_ZERO * mu_high.min()
     sides = [
-        Side("X", False, X_low, X_high),
-        Side(r"$\mu$", True, np.maximum(mu_low, bottom), mu_high),
+        PictureAxis("X", False, X_low, X_high),
+        PictureAxis(r"$\mu$", True, np.maximum(mu_low, bottom), mu_high),
     ]
     return Cells(sides, *_of_islands(), content.local_error.T)
 
@@ -66,7 +66,7 @@ def _island4d_cells(content: TableContent) -> Cells:
     sides = []
     for number, axis in enumerate(content.axes[:2]):
         sides.append(
-            Side(
+            PictureAxis(
                 axis.name,
                 axis.transform == "log" and axis.offset == 0,
                 low[number].ravel(),
@@ -88,7 +88,7 @@ def _function_cells(table: FunctionTable) -> Cells:
     sides = []
     for number, axis in enumerate(table.axes[:2]):
         sides.append(
-            Side(
+            PictureAxis(
                 axis.name + _in(axis.unit),
                 axis.transform == "log" and axis.offset == 0,
                 axis.from_grid(low[:, number]),

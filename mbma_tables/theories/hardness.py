@@ -56,9 +56,9 @@ def with_hardness(
 
         loading = saturated = Saturated(theory, hardness_over_E_star)
         if largest_pressure is not None:
-            from mbma_tables.theories.simulated.yielded import Unloaded
+            from mbma_tables.theories.simulated.yielded import UnloadedMap
 
-            return Unloaded(saturated, np.asarray(largest_pressure, float) / E_star)
+            return UnloadedMap(saturated, np.asarray(largest_pressure, float) / E_star)
     else:
         from mbma_tables.theories.yielding.theory import Yielding
 

@@ -16,7 +16,7 @@ from mbma_tables.theories.base import Theory, TheoryAnswer
 from mbma_tables.theories.calibrated.formulas import (
     LAW_ERROR,
     YANG_PERSSON,
-    Law,
+    SpectrumLaw,
     area,
     self_affine_law,
     spectrum_of,
@@ -31,13 +31,13 @@ INVERSE_RTOL = 1e-10  # error of a load found from its separation
 
 
 @shared(32)
-def _own_law(surface: MeasuredSurface) -> Law:
+def _own_law(surface: MeasuredSurface) -> SpectrumLaw:
     """Persson's theory for a surface's own spectrum, with Yang and Persson's weight."""
-    return Law(spectrum_of(surface), None, YANG_PERSSON)
+    return SpectrumLaw(spectrum_of(surface), None, YANG_PERSSON)
 
 
 def _by_bands(surface: BandedSurface, quantity: str, given: FloatArray) -> FloatArray:
-    """Rows of a quantity of `Law` of a batch of spectra."""
+    """Rows of a quantity of `SpectrumLaw` of a batch of spectra."""
     number = np.arange(math.prod(surface.shape)).reshape(surface.shape)
     columns = (
         np.ascontiguousarray(np.broadcast_to(number, given.shape)).ravel(),
@@ -56,7 +56,7 @@ def _by_bands(surface: BandedSurface, quantity: str, given: FloatArray) -> Float
 class _Light:
     """The light-load form (20) of a law: u0/h_rms and ln of lambda over the rms gradient, Eq. (21)."""
 
-    def __init__(self, law: Law) -> None:
+    def __init__(self, law: SpectrumLaw) -> None:
         s = law.spectrum
         log_g = np.log(s.below) / 2
         shares = s.x * s.variance / (4 * s.gradient) * np.exp(-log_g)

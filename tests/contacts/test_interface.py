@@ -24,7 +24,7 @@ from mbma_tables.bodies.materials import tangential_ratio
 from mbma_tables.contacts.quantities.conductances import cooper_mikic_yovanovich
 from mbma_tables.contacts.quantities.gas import R, jump_of, mean_inverse
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.theories.simulated.boundary_elements import Contact
+from mbma_tables.theories.simulated.boundary_elements import BoundaryElementContact
 
 FACE = Surface(hurst=0.8, q0=0.01, q1=2.0, h_rms=1.0, h_max=3.0, unit="um")
 RADIUS = 5.0
@@ -257,7 +257,7 @@ def test_gaps_of_boundary_elements(hurst, seed, eta):
     recipe = Recipe("self_affine", hurst, 6, 4, seed, 128)
     z = heights(recipe)
     slope = np.hypot(*np.gradient(z, 1 / 128)).std()
-    solved = Contact(z / slope, recipe.sizes, hardness=eta)
+    solved = BoundaryElementContact(z / slope, recipe.sizes, hardness=eta)
     jumps = np.array([0.3, 1.0, 3.0])
     for area in (0.01, 0.05, 0.2):
         solved.press(load_at(area, eta))

@@ -93,7 +93,11 @@ def recorded(using):
 
 def table_of_a_function():
     """A table of two numbers and two outputs, three cells of four coefficients each."""
-    from mbma_tables.tables.function_table import FunctionAxis, FunctionTable, Output
+    from mbma_tables.tables.function_table import (
+        FunctionAxis,
+        FunctionOutput,
+        FunctionTable,
+    )
 
     axes = (
         FunctionAxis("x", 0.0, 1.0, "log", 0.5),
@@ -107,7 +111,9 @@ def table_of_a_function():
         "coefficients": np.linspace(0.1, 1.0, 24),
         "errors": np.full((3, 2), 1e-3),
     }
-    return FunctionTable(axes, (Output("u"), Output("v", transform="log")), arrays, {})
+    return FunctionTable(
+        axes, (FunctionOutput("u"), FunctionOutput("v", transform="log")), arrays, {}
+    )
 
 
 def use():

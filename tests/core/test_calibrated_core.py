@@ -18,8 +18,8 @@ from mbma_tables.theories.calibrated.formulas import (
     LAW_ERROR,
     PERSSON,
     YANG_PERSSON,
-    Law,
     Spectrum,
+    SpectrumLaw,
 )
 from mbma_tables.theories.calibrated.table import shipped
 
@@ -313,7 +313,7 @@ class TestCurve:
     @pytest.mark.parametrize(("hurst", "zeta_1"), SELF_AFFINE)
     def test_of_self_affine_surfaces(self, hurst, zeta_1):
         number = SELF_AFFINE.index((hurst, zeta_1))
-        law = Law(
+        law = SpectrumLaw(
             Spectrum.self_affine(hurst, zeta_1),
             None,
             [CONSTANTS, YANG_PERSSON, PERSSON][number % 3],
@@ -341,7 +341,7 @@ class TestCurve:
         random = np.random.default_rng(samples)
         q = np.sort(np.exp(random.uniform(0, 6, samples)))
         C = np.minimum(1, q**-3.5) * np.exp(random.normal(0, scatter, samples))
-        law = Law(Spectrum.from_samples(q, C))
+        law = SpectrumLaw(Spectrum.from_samples(q, C))
         force = np.array([1e-9, 0.03, 1.5])
         found = np.log(law.separation_persson(force)[0]) + 2 * force**2
         np.testing.assert_allclose(
@@ -350,7 +350,7 @@ class TestCurve:
 
     @pytest.mark.parametrize("h_max", [None, 0.5, 3.2, 30.0, 1e300])
     def test_separation_is_the_inverse_of_force(self, h_max):
-        law = Law(Spectrum.self_affine(0.7, 100.0), h_max)
+        law = SpectrumLaw(Spectrum.self_affine(0.7, 100.0), h_max)
         u = np.append(10.0 ** np.linspace(-280, -1, 60), np.linspace(0.11, 12, 50))
         u = u[u < 0.999 * (h_max or np.inf)]
         force, area, stiffness = law.contact(u)
@@ -364,7 +364,7 @@ class TestCurve:
         np.testing.assert_allclose(stiffness[some], -rate, rtol=1e-8)
 
     def test_ends(self):
-        law = Law(Spectrum.self_affine(0.7, 100.0), 3.0)
+        law = SpectrumLaw(Spectrum.self_affine(0.7, 100.0), 3.0)
         assert [row.tolist() for row in law.contact([0.0, 3.0, 4.0])] == [
             [np.inf, 0, 0],
             [1, 0, 0],
@@ -384,7 +384,7 @@ class TestAnyInputOfSpectra:
     def test_of_forces_and_separations(self, used):
         x = np.array(ODD)
         for h_max in (None, 3.0):
-            law = Law(Spectrum.self_affine(0.8, 64.0), h_max)._prepared
+            law = SpectrumLaw(Spectrum.self_affine(0.8, 64.0), h_max)._prepared
             u, slope, back = np.empty((3, x.size))
             assert (
                 used.spectrum_law_separation(law, x, 0, u, slope)
@@ -409,14 +409,14 @@ def test_what_is_no_spectrum_is_refused():
         Spectrum.from_samples(np.array([1.0, 2.0]), np.array([1.0, 0.0]))
     good = Spectrum.self_affine(0.8, 64.0)
     with pytest.raises(InputError, match="rising"):
-        Law(
+        SpectrumLaw(
             Spectrum(
                 good.x, good.variance, good.below[::-1].copy(), good.gradient, good.alpha
             )
         ).force(1.0)
     # less than nothing is left by this weight
     with pytest.raises(ConvergenceError, match="no curve"):
-        Law(good, None, CONSTANTS.__class__(weight=-5.0)).force(1.0)
+        SpectrumLaw(good, None, CONSTANTS.__class__(weight=-5.0)).force(1.0)
 
 
 CASES = {

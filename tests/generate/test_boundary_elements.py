@@ -235,7 +235,7 @@ def test_loads_of_large_surfaces_are_kept_one_by_one(tmp_path, monkeypatch):
     for name in ("whole", "stopped"):
         (tmp_path / name).mkdir()
     whole = solve.simulate_wide(RECIPE, tmp_path / "whole")
-    press = solve.boundary_elements.Contact.press
+    press = solve.boundary_elements.BoundaryElementContact.press
     pressed = []
 
     def stopped(self, force):
@@ -244,7 +244,7 @@ def test_loads_of_large_surfaces_are_kept_one_by_one(tmp_path, monkeypatch):
         pressed.append(force)
         return press(self, force)
 
-    monkeypatch.setattr(solve.boundary_elements.Contact, "press", stopped)
+    monkeypatch.setattr(solve.boundary_elements.BoundaryElementContact, "press", stopped)
     folder = tmp_path / "stopped"
     with pytest.raises(KeyboardInterrupt):
         solve.simulate_wide(RECIPE, folder)

@@ -20,7 +20,7 @@ from generate.calibrated import (
 )
 from generate.calibrated_file import QUANTITIES, write_part
 from mbma_tables.common.errors import TableFileError
-from mbma_tables.theories.calibrated.formulas import CONSTANTS, Law, Spectrum
+from mbma_tables.theories.calibrated.formulas import CONSTANTS, Spectrum, SpectrumLaw
 from mbma_tables.theories.dataset import read_groups
 
 FORCES = np.geomspace(4e-4, 1.0, 15)
@@ -38,7 +38,7 @@ TRUE = dataclasses.replace(
 def case(hurst, zeta_1, h_max=6.0, factor=1.0):
     """A surface on which simulation agrees with TRUE, forces times a factor."""
     spectrum = Spectrum.self_affine(hurst, zeta_1)
-    law = Law(spectrum, h_max, TRUE)
+    law = SpectrumLaw(spectrum, h_max, TRUE)
     return Case(
         "self_affine", TRAINING, (hurst, zeta_1), 4, 256, spectrum, spectrum, h_max, {}, FORCES, law.area(FORCES),
         law.separation(FORCES / factor),

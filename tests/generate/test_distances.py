@@ -19,7 +19,7 @@ from generate.theories_of_others import FORCES, Corrected
 from mbma_tables import InputError, Surface, contact
 from mbma_tables.common.files import shipped_file
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.theories.calibrated.formulas import PERSSON, Law, Spectrum
+from mbma_tables.theories.calibrated.formulas import PERSSON, Spectrum, SpectrumLaw
 
 PAGE = (ROOT / "docs" / "fidelity.md").read_text("utf-8")
 PICKED = (
@@ -195,7 +195,7 @@ def test_scores_of_a_file(tmp_path):
 
 def test_perssons_theory_is_the_correction_without_one():
     surface = Surface(0.7, 1.0, 40.0, 1.0, 3.3)
-    law = Law(Spectrum.self_affine(0.7, 40.0), None, PERSSON)
+    law = SpectrumLaw(Spectrum.self_affine(0.7, 40.0), None, PERSSON)
     force = FORCES[(FORCES > 1e-3) & (FORCES < 2)]
     area, u = Corrected("none", (1.0,)).at_pressure(
         surface, force * float(surface.rms_gradient)

@@ -15,9 +15,10 @@ from small_tables import SMALL, small, small_build
 from generate.__main__ import main
 from generate.files import ROOT
 from generate.tables import KINDS, TABLES
+from mbma_tables.common.errors import UncertifiedError
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.tables import certificate
-from mbma_tables.tables.certificate import Kind, UncertifiedError, phi
+from mbma_tables.tables.certificate import Kind, phi
 from mbma_tables.tables.configuration import MIN_SHIPPED_POINTS, load
 from mbma_tables.tables.open import shipped
 from mbma_tables.tables.reader import read_table

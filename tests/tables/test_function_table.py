@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from mbma_tables import InputError, OutOfRangeError, TableFileError, open_table
 from mbma_tables.cli import main
+from mbma_tables.common.errors import UncertifiedError
 from mbma_tables.common.workers import crew
 from mbma_tables.tables import make_function
 from mbma_tables.tables.boxes import (
@@ -25,7 +26,6 @@ from mbma_tables.tables.boxes import (
     Aim,
     Box,
     Piece,
-    UnreachedError,
 )
 from mbma_tables.tables.make_function import make, merge, verified_errors, wanted_of
 
@@ -435,7 +435,7 @@ def test_functions_that_cannot_be_tabulated_are_named(
     function, outputs, message, tmp_path
 ):
     entries = {"axes": {"x": UNIT}, **({"outputs": outputs} if outputs else {})}
-    with pytest.raises((InputError, UnreachedError), match=message):
+    with pytest.raises((InputError, UncertifiedError), match=message):
         made(tmp_path, function, entries, 1e-6)
     assert not (tmp_path / "t.nc").exists()
 
@@ -508,9 +508,9 @@ def test_wrong_configurations_are_refused_by_name(entries, message):
 
 def test_too_few_coefficients_are_named(tmp_path):
     entries = SMOOTH | {"max_coefficients": 10, "pieces": 1}
-    with pytest.raises(UnreachedError, match="10 coefficients do not reach the target"):
+    with pytest.raises(UncertifiedError, match="10 coefficients do not reach the target"):
         made(tmp_path, "smooth", entries, 1e-10)
-    with pytest.raises(UnreachedError, match="coefficients do not reach the target"):
+    with pytest.raises(UncertifiedError, match="coefficients do not reach the target"):
         made(
             tmp_path,
             "diagonal",

@@ -171,7 +171,7 @@ def gas_conductance_scatter(contact: State) -> Any:
     if gas.name == VACUUM:
         return 0.0 * contact.mean_separation
 
-    def scatter(gaps: Gaps, conductivity: Any, of_gap: Any) -> Any:
+    def scatter(gaps: GapsOfGas, conductivity: Any, of_gap: Any) -> Any:
         of_mean = scatter_of_mean(gaps.area, gaps.jump, gaps.h_rms)
         return np.hypot(of_mean, exponent_of_gap(*gaps) * of_gap / gaps.u)
 
@@ -188,13 +188,13 @@ def conductance_of_gas(contact: State, gas: Gas) -> Any:
         return 0.0 * contact.mean_separation
     metre = factor("m", contact.unit_system.length)
 
-    def conductance(gaps: Gaps, conductivity: Any) -> Any:
+    def conductance(gaps: GapsOfGas, conductivity: Any) -> Any:
         return conductivity * metre * mean_inverse(*gaps)
 
     return _of_gaps(contact, gas, conductance)
 
 
-class Gaps(NamedTuple):
+class GapsOfGas(NamedTuple):
     """What the laws of `mbma_tables.contacts.quantities.gas` take, in the unit of lengths of a contact."""
 
     u: Any
@@ -221,7 +221,7 @@ def _of_gaps(contact: State, gas: Gas, function: Callable[..., Any], *others: An
     ) -> tuple[Any, ...]:
         conductivity, jump = jump_of(gas.name, temperature, pressure, accommodation)
         eta = getattr(theory, "hardness", np.inf) / np.asarray(surface.rms_gradient)
-        gaps = Gaps(u, area, jump * metre, surface.h_rms, eta)
+        gaps = GapsOfGas(u, area, jump * metre, surface.h_rms, eta)
         return (function(gaps, conductivity, *more),)
 
     of_metals = GASES[gas.name].accommodation

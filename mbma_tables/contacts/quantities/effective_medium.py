@@ -15,9 +15,9 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.theories.calibrated.formulas import (
     CONSTANTS,
-    Constants,
-    Law,
+    CalibratedConstants,
     Spectrum,
+    SpectrumLaw,
     area,
     force_at_area,
     light_factor,
@@ -84,7 +84,7 @@ def _rule() -> tuple[FloatArray, FloatArray]:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Gaps:
+class GapStatistics:
     """Gaps of the endless Gaussian surface by the calibrated law, at a row of loads."""
 
     # of the surface that leaves contact within a band of magnification, (loads, bands),
@@ -129,7 +129,9 @@ def _shares(spectrum: Spectrum) -> tuple[FloatArray, FloatArray, FloatArray]:
     return parts[0][held], parts[1][held] / parts[1].sum(), parts[2][held]
 
 
-def gaps(spectrum: Spectrum, force: ArrayLike, constants: Constants = CONSTANTS) -> Gaps:
+def gaps(
+    spectrum: Spectrum, force: ArrayLike, constants: CalibratedConstants = CONSTANTS
+) -> GapStatistics:
     """Gaps at loads F/(A0 E* g), magnification by magnification."""
     variance, slope, wave = _shares(spectrum)
     load = np.asarray(force, float)[:, None]
@@ -153,12 +155,14 @@ def gaps(spectrum: Spectrum, force: ArrayLike, constants: Constants = CONSTANTS)
             spectrum.alpha,
         )
         carried = load[:, 0] / cover[:, first] / math.sqrt(left)
-        mean[:, first] = Law(part, None, constants).separation(carried) * spread[first]
+        mean[:, first] = (
+            SpectrumLaw(part, None, constants).separation(carried) * spread[first]
+        )
     share = cover[:, :-1] - cover[:, 1:]
     volume = mean * cover
     open_ = np.maximum(volume[:, :-1] - volume[:, 1:], 0)
     touched = share > NO_COVER
-    return Gaps(
+    return GapStatistics(
         np.where(touched, share, 0.0),
         np.divide(open_, share, out=np.zeros(share.shape), where=touched),
         np.sqrt((above[1:] + above[:-1]) / 2),
@@ -171,14 +175,14 @@ def contact_factor(
     spectrum: Spectrum,
     contact: ArrayLike,
     flow: FlowConstants,
-    constants: Constants = CONSTANTS,
+    constants: CalibratedConstants = CONSTANTS,
 ) -> FloatArray:
     """ln R at contact fractions A/A0 above zero and below the threshold."""
     load = force_at_area(contact, light_factor(spectrum.alpha, constants), constants)
     return log_factor(gaps(spectrum, load, constants), flow)
 
 
-def log_factor(found: Gaps, flow: FlowConstants) -> FloatArray:
+def log_factor(found: GapStatistics, flow: FlowConstants) -> FloatArray:
     """ln R for the gaps of a spectrum, scaled by their mean; -infinity where blocked."""
     share, log_cube = found.quadrature
     mean = np.sum(share * np.exp(log_cube / 3), axis=1)

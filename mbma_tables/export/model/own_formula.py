@@ -30,7 +30,7 @@ from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.island_models import Certificate
 from mbma_tables.surfaces.surface import Surface
 from mbma_tables.tables.open import universal_model
-from mbma_tables.theories.mbma.closed_forms import FUNCTIONS, Function, evaluate
+from mbma_tables.theories.mbma.closed_forms import FUNCTIONS, ClosedForm, evaluate
 
 MOST_TERMS = 60
 DEGREES = (2, 3, 4, 5, 6)
@@ -292,7 +292,7 @@ class Term(NamedTuple):
 class OwnFormula:
     """A closed formula of one result for a range, with its errors."""
 
-    function: Function  #: arguments and steps, whose last is the result
+    function: ClosedForm  #: arguments and steps, whose last is the result
     degree: int
     cross_validated: float  #: root mean square error of the sum, on groups left out
     certificate: Certificate  #: on groups that neither the choice nor the fit saw
@@ -394,7 +394,7 @@ def _sum_text(terms: Iterable[Term]) -> str:
     return _signed(parts)
 
 
-def _function(own: Range, result: str, form: Form, terms: Sequence[Term]) -> Function:
+def _function(own: Range, result: str, form: Form, terms: Sequence[Term]) -> ClosedForm:
     steps = {**form.before, form.total: _sum_text(terms), result: form.last}
     used = {result}
     needed = {}
@@ -405,11 +405,11 @@ def _function(own: Range, result: str, form: Form, terms: Sequence[Term]) -> Fun
     names = ("X", "mu") if own.of == "islands" else SURFACE_ARGUMENTS
     arguments = tuple(name for name in names if name not in own.fixed)
     in_order = dict(reversed(needed.items()))
-    return Function("own", result, arguments, TITLES[result], in_order)
+    return ClosedForm("own", result, arguments, TITLES[result], in_order)
 
 
 def _shortest(
-    make: Callable[[Sequence[Term]], Function], terms: Sequence[Term], samples: Samples
+    make: Callable[[Sequence[Term]], ClosedForm], terms: Sequence[Term], samples: Samples
 ) -> list[Term]:
     """Terms of the fewest digits whose error on samples is about that of all digits."""
 
@@ -429,7 +429,7 @@ def _shortest(
     return short(digits)
 
 
-def relative_errors(function: Function, samples: Samples) -> FloatArray:
+def relative_errors(function: ClosedForm, samples: Samples) -> FloatArray:
     """Magnitudes of a function's relative errors at samples."""
     value = evaluate(function.steps, samples.arguments)[function.result]
     return np.asarray(np.abs(value / samples.results[function.result] - 1))

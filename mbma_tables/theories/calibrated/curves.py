@@ -18,7 +18,7 @@ from mbma_tables.surfaces.heights import SHARES
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories.calibrated.formulas import (
     LAW_ERROR,
-    Law,
+    SpectrumLaw,
     force_at_area,
     light_factor,
     spectrum_of,
@@ -40,7 +40,7 @@ FINE = 8
 ENDS = ", where the light-load and near-full-contact approximations of this map leave no gap: use theory='simulated'"
 
 
-class Curve:
+class CompressionCurve:
     """A map's curve from its highest point to full contact: stiffness rises monotonically between nodes of the law."""
 
     def __init__(self, law: MapLaw, h_max: float) -> None:
@@ -186,10 +186,12 @@ class OwnLaw:
     def __init__(self, surface: MeasuredSurface) -> None:
         self.h_rms, self.h_max = float(surface.h_rms), float(surface.h_max)
         self.gradient = float(surface.rms_gradient)
-        self.law: Law = Law(spectrum_of(surface), self.h_max / self.h_rms)
+        self.law: SpectrumLaw = SpectrumLaw(spectrum_of(surface), self.h_max / self.h_rms)
         self._known = self._map_law(surface)
         self.curve = (
-            None if self._known is None else Curve(self._known, self.h_max / self.h_rms)
+            None
+            if self._known is None
+            else CompressionCurve(self._known, self.h_max / self.h_rms)
         )
 
     @shared_property

@@ -28,7 +28,7 @@ UNRESOLVED = 4  # the core's status where a quadrature did not reach its toleran
 
 
 @dataclasses.dataclass(frozen=True)
-class Constants:
+class CalibratedConstants:
     """The law's constants."""
 
     # S of the area: s0 = area_s0 + area_slope ln(alpha/10), at most Persson's 1
@@ -41,15 +41,15 @@ class Constants:
     tail: float = 0.05822  # c of the Gaussian tail factor
 
 
-CONSTANTS = Constants()
-PERSSON = Constants(
+CONSTANTS = CalibratedConstants()
+PERSSON = CalibratedConstants(
     area_s0=1.0, area_slope=0.0, weight=1.0, weight_slope=0.0, cubic=0.0, tail=0.0
 )
 YANG_PERSSON = dataclasses.replace(PERSSON, weight=0.42, cubic=0.58)
 
 
 def area(
-    force: ArrayLike, alpha: ArrayLike, constants: Constants = CONSTANTS
+    force: ArrayLike, alpha: ArrayLike, constants: CalibratedConstants = CONSTANTS
 ) -> FloatArray:
     """A/A0 at F/(A0 E* g) >= 0 on a surface of Nayak's parameter alpha = m0 m4/m2^2."""
     return area_of(force, light_factor(alpha, constants), constants.area_t0)
@@ -65,7 +65,7 @@ def area_of(force: ArrayLike, s0: ArrayLike, t0: float) -> FloatArray:
 
 
 def force_of(
-    e: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS
+    e: ArrayLike, light: ArrayLike, constants: CalibratedConstants = CONSTANTS
 ) -> FloatArray:
     """F/(A0 E* g) at A/A0 = erf(e) by the light-load factor s0; inverts `area`: 2 y^2 (1 + y/t0) = e^2 (s0 + y/t0)."""
     wanted = np.asarray(e, float)
@@ -83,7 +83,9 @@ def force_of(
     return np.asarray(y)
 
 
-def light_factor(alpha: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
+def light_factor(
+    alpha: ArrayLike, constants: CalibratedConstants = CONSTANTS
+) -> FloatArray:
     """s0, the value of S at light loads."""
     return np.minimum(
         constants.area_s0 + constants.area_slope * np.log(np.asarray(alpha) / 10), 1.0
@@ -145,12 +147,12 @@ class Spectrum:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Law:
+class SpectrumLaw:
     """The curve of a spectrum, of a Gaussian surface without end or, with `h_max` [h_rms], of one that ends there."""
 
     spectrum: Spectrum
     h_max: float | None = None
-    constants: Constants = CONSTANTS
+    constants: CalibratedConstants = CONSTANTS
 
     @shared_property
     def tail(self) -> float:
@@ -243,10 +245,13 @@ class Law:
 
 @shared(KEPT)
 def self_affine_law(
-    hurst: float, zeta_1: float, h_max: float | None, constants: Constants = CONSTANTS
-) -> Law:
+    hurst: float,
+    zeta_1: float,
+    h_max: float | None,
+    constants: CalibratedConstants = CONSTANTS,
+) -> SpectrumLaw:
     """The law of a self-affine surface, cached."""
-    return Law(Spectrum.self_affine(hurst, zeta_1), h_max, constants)
+    return SpectrumLaw(Spectrum.self_affine(hurst, zeta_1), h_max, constants)
 
 
 @shared(KEPT)
@@ -258,7 +263,7 @@ def spectrum_of(surface: Any) -> Spectrum:
 
 
 def force_at_area(
-    area: ArrayLike, light: ArrayLike, constants: Constants = CONSTANTS
+    area: ArrayLike, light: ArrayLike, constants: CalibratedConstants = CONSTANTS
 ) -> FloatArray:
     """F/(A0 E* g) at A/A0."""
     from scipy.special import erfinv

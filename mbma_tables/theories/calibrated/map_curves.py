@@ -20,9 +20,9 @@ from mbma_tables.surfaces.bearing_curve import FRACTIONS, Bearing, RadialSpectru
 from mbma_tables.theories.calibrated import formulas as calibrated
 from mbma_tables.theories.calibrated.formulas import (
     CONSTANTS,
-    Constants,
-    Law,
+    CalibratedConstants,
     Spectrum,
+    SpectrumLaw,
     light_factor,
 )
 
@@ -121,7 +121,7 @@ class MapLaw:
     tension_force: FloatArray
     tension: FloatArray
     anisotropy: float = 1.0
-    constants: Constants = CONSTANTS
+    constants: CalibratedConstants = CONSTANTS
     map_constants: MapConstants = MAP_CONSTANTS
     plateau_shift: float = PLATEAU_SHIFT
 
@@ -231,7 +231,7 @@ class MapLaw:
     @shared_property
     def _curve(self) -> tuple[FloatArray, FloatArray]:
         """ln F and u, u falling."""
-        law = Law(self.spectrum, None, self.constants)
+        law = SpectrumLaw(self.spectrum, None, self.constants)
         m = self.map_constants
         log_force = LOG_FORCE
         force = np.exp(LOG_FORCE)

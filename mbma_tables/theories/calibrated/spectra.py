@@ -1,6 +1,6 @@
 """The calibrated law and Persson's theory of many spectra at once, sums of power laws each.
 
-`calibrated.formulas.Law` prepares the polynomials of one spectrum, which takes as long as
+`calibrated.formulas.SpectrumLaw` prepares the polynomials of one spectrum, which takes as long as
 hundreds of answers here.
 """
 
@@ -22,9 +22,9 @@ from mbma_tables.surfaces.surface import Surface
 from mbma_tables.theories.calibrated.formulas import (
     CONSTANTS,
     NARROWNESS,
-    Constants,
-    Law,
+    CalibratedConstants,
     Spectrum,
+    SpectrumLaw,
 )
 
 # ln y of the inner integral: the first cell, up to whose end it is linear in ln y to 3e-10,
@@ -45,11 +45,11 @@ def _unit_integral(powers: int) -> FloatArray:
     The law of a single wavenumber is this integral over 4.
     """
     weight, cubic = ((1.0, 0.0), (0.0, 1.0), (0.0, 0.0))[powers]
-    constants = Constants(
+    constants = CalibratedConstants(
         weight=weight, weight_slope=0.0, cubic=cubic, tail=0.0, area_slope=0.0
     )
     one = np.ones(1)
-    law = Law(Spectrum(one, one, one, 1.0, 1.5), None, constants)
+    law = SpectrumLaw(Spectrum(one, one, one, 1.0, 1.5), None, constants)
     edges = np.arange(FIRST, LAST, 1 / RATE)
     places = np.cos(np.pi * (np.arange(TERMS) + 0.5) / TERMS)
     log_y = np.add.outer(edges, (1 + places) / (2 * RATE))
@@ -65,7 +65,9 @@ def _unit_integral(powers: int) -> FloatArray:
 
 
 @shared()
-def inner_integral(constants: Constants) -> tuple[FloatArray, FloatArray, FloatArray]:
+def inner_integral(
+    constants: CalibratedConstants,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The inner integral of W and its derivative by the narrowness, as the core takes them."""
     parts = [_unit_integral(k) for k in range(3)]
     a = constants.weight
@@ -84,7 +86,7 @@ class Spectra:
         Power laws whose sum a spectrum is: q_low, q_high, C at q_low, power of q.
     alpha, h_max : array, shape (surfaces,)
         Nayak's bandwidth parameter; highest point [h_rms], perhaps infinite.
-    constants : Constants, optional
+    constants : CalibratedConstants, optional
 
     Raises
     ------
@@ -97,7 +99,7 @@ class Spectra:
         laws: FloatArray,
         alpha: FloatArray,
         h_max: FloatArray,
-        constants: Constants = CONSTANTS,
+        constants: CalibratedConstants = CONSTANTS,
     ) -> None:
         inner = inner_integral(constants)
         given = np.array(dataclasses.astuple(constants))

@@ -10,7 +10,7 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray, filled
 from mbma_tables.common.shared import shared
 from mbma_tables.core import core
-from mbma_tables.theories.calibrated.formulas import Constants
+from mbma_tables.theories.calibrated.formulas import CalibratedConstants
 from mbma_tables.theories.evidence import (
     Part,
     SurfaceSpline,
@@ -23,10 +23,10 @@ AXES = ("hurst", "log_zeta_1", "log_separation")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Table(SurfaceSpline):
+class CalibratedTable(SurfaceSpline):
     """The shipped table: ln of the force on a surface without end; the core applies the end at h_max and the area."""
 
-    constants: Constants  # of the law
+    constants: CalibratedConstants  # of the law
     # largest relative error of force against the law's own quadrature, at held-out points
     error: float
 
@@ -44,18 +44,21 @@ class Table(SurfaceSpline):
         ]
 
 
-def load(path: pathlib.Path) -> Table:
+def load(path: pathlib.Path) -> CalibratedTable:
     """Read a table file; one that is damaged, or is another file, is a TableFileError."""
     return _table_of(read_parts(path)[""])
 
 
-def _table_of(part: Part) -> Table:
+def _table_of(part: Part) -> CalibratedTable:
     """The table of a file's variables and attributes."""
     values, facts, covered = part
-    constants = Constants(
-        *(float(facts[f"law_{field.name}"]) for field in dataclasses.fields(Constants))
+    constants = CalibratedConstants(
+        *(
+            float(facts[f"law_{field.name}"])
+            for field in dataclasses.fields(CalibratedConstants)
+        )
     )
-    return Table(
+    return CalibratedTable(
         *nodes_of([values[name] for name in AXES]),
         np.array([covered[name] for name in AXES]),
         values["spline"],
@@ -66,6 +69,6 @@ def _table_of(part: Part) -> Table:
 
 
 @shared()
-def shipped() -> Table:
+def shipped() -> CalibratedTable:
     """The shipped table, read once."""
     return _table_of(shipped_parts()[""])

@@ -8,7 +8,7 @@ import pathlib
 import re
 import tomllib
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,7 +39,7 @@ Steps = Mapping[str, str]
 
 
 @dataclasses.dataclass(frozen=True)
-class Function:
+class ClosedForm:
     """One closed form of one result: each step uses the arguments and earlier steps, the last is the value."""
 
     form: str
@@ -55,7 +55,7 @@ class Function:
         ]
 
 
-def read_functions(text: str) -> dict[str, dict[str, Function]]:
+def read_functions(text: str) -> dict[str, dict[str, ClosedForm]]:
     """The functions of a file's text by form and result."""
 
     def steps(lines: str) -> dict[str, str]:
@@ -64,12 +64,12 @@ def read_functions(text: str) -> dict[str, dict[str, Function]]:
             line.split(" = ", 1) for line in re.sub(r"\n +", " ", lines).splitlines()
         )
 
-    found: dict[str, dict[str, Function]] = {}
+    found: dict[str, dict[str, ClosedForm]] = {}
     for form, own in tomllib.loads(text).items():
         arguments = tuple(own.pop("arguments"))
         shared = steps(own.pop("shared"))
         found[form] = {
-            result: Function(
+            result: ClosedForm(
                 form, result, arguments, one["title"], shared | steps(one["steps"])
             )
             for result, one in own.items()
@@ -143,17 +143,9 @@ class FormulaModel(Ranged):
         return out
 
 
-class ClosedTotals(NamedTuple):
-    """Force over nominal area [unit of `E_star`], A/A0, and the largest relative error of either as certified."""
-
-    pressure: FloatArray
-    area: FloatArray
-    error: float
-
-
 def closed_totals(
     surface: Surface, separation: ArrayLike, E_star: ArrayLike = 1.0
-) -> ClosedTotals:
+) -> tuple[FloatArray, FloatArray, float]:
     """Total force and area by the closed totals, variant "reported".
 
     Parameters
@@ -163,8 +155,10 @@ def closed_totals(
 
     Returns
     -------
-    ClosedTotals
-        Force and area in the broadcast shape.
+    pressure, area : array_like
+        Force over nominal area [unit of `E_star`] and A/A0, in the broadcast shape.
+    error : float
+        The largest relative error of either, as certified.
 
     Raises
     ------
@@ -212,8 +206,5 @@ def closed_totals(
         f"at least {low:g}, where the closed totals hold",
     )
     scale = modulus * surface.q0 * surface.h_rms
-    return ClosedTotals(
-        pressure * scale,
-        area,
-        max(found.largest for found in CERTIFICATES[TOTALS].values()),
-    )
+    error = max(found.largest for found in CERTIFICATES[TOTALS].values())
+    return pressure * scale, area, error

@@ -15,7 +15,10 @@ import numpy as np
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
-from mbma_tables.theories.simulated.boundary_elements import TOLERANCE, Contact
+from mbma_tables.theories.simulated.boundary_elements import (
+    TOLERANCE,
+    BoundaryElementContact,
+)
 
 MOST_RENEWALS = 200
 SETTLED = (
@@ -36,7 +39,7 @@ class AdhesiveContact:
     traction : callable
         Attraction over E* at an array of gaps [length].
     tolerance, mirrored
-        As for `Contact`.
+        As for `BoundaryElementContact`.
     """
 
     def __init__(
@@ -48,7 +51,9 @@ class AdhesiveContact:
         mirrored: bool = False,
     ) -> None:
         self._heights = np.asarray(surface, float) - np.mean(surface)
-        self._contact = Contact(self._heights, sizes, tolerance, mirrored=mirrored)
+        self._contact = BoundaryElementContact(
+            self._heights, sizes, tolerance, mirrored=mirrored
+        )
         self._traction = traction
         self._pull: FloatArray = np.zeros(self._heights.shape)
 

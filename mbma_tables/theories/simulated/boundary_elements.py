@@ -100,7 +100,7 @@ def project(p: FloatArray, mean: float, cap: float) -> FloatArray:
     return clipped
 
 
-class Contact:
+class BoundaryElementContact:
     """A map against a rigid plane; each load starts from the pressures of the one before.
 
     Parameters
@@ -265,9 +265,9 @@ class Contact:
         overlap = np.where(yielded, np.minimum(self._rest, 0.0), 0.0)
         return np.asarray(self.surface + overlap)
 
-    def unloading(self) -> Contact:
+    def unloading(self) -> BoundaryElementContact:
         """The elastic contact of the map as the last load left it, under that load."""
-        after = Contact(
+        after = BoundaryElementContact(
             self.residual_heights(), self.sizes, self.tolerance, mirrored=self.mirrored
         )
         after.pressure = self.traction.copy()

@@ -18,7 +18,7 @@ from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.progress import doing, shown
 from mbma_tables.surfaces.map_simulation import ROUNDING
 from mbma_tables.theories.simulated.boundary_elements import (
-    Contact,
+    BoundaryElementContact,
     composed,
     wavenumbers,
     waves,
@@ -80,7 +80,7 @@ class Press:
 
     `gradient` is about its rms gradient, `hardness` is over E*, and `left_out` the
     wavelength [length] below which a large map was cut off, 0 if it was not; `mirrored` as
-    for `Contact`.
+    for `BoundaryElementContact`.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Press:
             mirrored,
         )
         self._tolerance, self._cap = tolerance, hardness / gradient
-        self._engine: Contact | None = None
+        self._engine: BoundaryElementContact | None = None
         self.quantities = YIELDING if hardness < np.inf else QUANTITIES
         # of rms gradient one, heights of order one
         self.scale = float(np.abs(heights).max())
@@ -133,7 +133,7 @@ class Press:
             if kept is None:
                 if self._engine is None:
                     own = self.heights / self.scale
-                    self._engine = Contact(
+                    self._engine = BoundaryElementContact(
                         own, self._sizes, self._tolerance, self._cap, self.mirrored
                     )
                 result = self._engine.press(load / self.gradient)
@@ -154,7 +154,9 @@ class Press:
         kept = cache.load(name, heights=self.heights.shape)
         if kept is None:
             own = self.heights / self.scale
-            engine = Contact(own, self._sizes, self._tolerance, self._cap, self.mirrored)
+            engine = BoundaryElementContact(
+                own, self._sizes, self._tolerance, self._cap, self.mirrored
+            )
             with shown("boundary elements"):
                 engine.press(load / self.gradient)
             kept = {"heights": engine.residual_heights()}

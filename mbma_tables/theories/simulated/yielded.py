@@ -328,7 +328,7 @@ class Residuals(Theory):
         )
 
 
-class Unloaded(Unloading):
+class UnloadedMap(Unloading):
     """A simulated map with a hardness after a largest pressure: its residual shape, pressed elastically."""
 
     def __init__(self, loading: Saturated, largest: ArrayLike) -> None:

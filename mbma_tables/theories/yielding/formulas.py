@@ -28,7 +28,7 @@ MIN_SPACING = 0.02  # relative, of mean gaps between nodes of a map's bearing cu
 
 
 @dataclasses.dataclass(frozen=True)
-class Constants:
+class YieldConstants:
     """The law's constants, fitted to boundary elements."""
 
     area_power: float = 3.196  # a and b of S for the contact area,
@@ -45,11 +45,11 @@ class Constants:
     plane_load: float = 2.505
 
 
-CONSTANTS = Constants()
+CONSTANTS = YieldConstants()
 
 
 @functools.cache
-def _numbers(constants: Constants) -> FloatArray:
+def _numbers(constants: YieldConstants) -> FloatArray:
     """The constants as the core takes them, `mbma_hardness_law` of mbma.h."""
     return frozen(np.array(dataclasses.astuple(constants)))
 
@@ -58,7 +58,7 @@ def area(
     force: ArrayLike,
     elastic_area: ArrayLike,
     eta: ArrayLike,
-    constants: Constants = CONSTANTS,
+    constants: YieldConstants = CONSTANTS,
     yielded: bool = False,
 ) -> FloatArray:
     """A/A0, or its yielded part, at F/(A0 E* g), at most eta, from the elastic A/A0 there; above 1 only if that is."""
@@ -80,7 +80,7 @@ def force(
     share: ArrayLike,
     slope: ArrayLike,
     eta: ArrayLike,
-    constants: Constants = CONSTANTS,
+    constants: YieldConstants = CONSTANTS,
 ) -> tuple[FloatArray, FloatArray]:
     """F/(A0 E* g) at a mean gap u and -dF/du, from the elastic force and stiffness there.
 
@@ -118,13 +118,13 @@ def closed(
     return load * gradient, steep * (gradient / h_rms)
 
 
-def frozen_factor(eta: ArrayLike, constants: Constants = CONSTANTS) -> FloatArray:
+def frozen_factor(eta: ArrayLike, constants: YieldConstants = CONSTANTS) -> FloatArray:
     """Stiffness of the frozen contact over the elastic -dF/du at the same mean gap."""
     return answered(core.frozen_factors, (eta,), 1, _numbers(constants))[0]
 
 
 def plane_separation(
-    u: ArrayLike, load: ArrayLike, eta: ArrayLike, constants: Constants = CONSTANTS
+    u: ArrayLike, load: ArrayLike, eta: ArrayLike, constants: YieldConstants = CONSTANTS
 ) -> FloatArray:
     """Gap between mean planes [h_rms] at mean gap u and x = F/(p_m A0): less the flattening of yielded points."""
     return answered(core.yielding_planes, (u, load, eta), 1, _numbers(constants))[0]

@@ -35,8 +35,8 @@ from mbma_tables.theories import Calibrated, Mbma, Persson, resolve
 from mbma_tables.theories.base import Theory
 from mbma_tables.theories.calibrated.formulas import (
     CONSTANTS,
-    Law,
     Spectrum,
+    SpectrumLaw,
     self_affine_law,
 )
 from mbma_tables.theories.calibrated.map_curves import MAP_CONSTANTS, hertz_ellipse
@@ -51,7 +51,7 @@ SHARES = np.array([1e-5, 0.001, 0.03, 0.2, 0.5, 0.8, 0.93])
 
 
 def quadrature(surface, u):
-    law = Law(
+    law = SpectrumLaw(
         Spectrum.self_affine(float(surface.hurst), float(surface.zeta_1)),
         float(surface.h_max / surface.h_rms),
     )
@@ -215,7 +215,7 @@ def test_surfaces_with_a_plateau_by_their_own_spectrum(number, top):
     _, q, variance = rows[rows[:, 0] == number].T
     spectrum = Spectrum.from_shares(q, variance)
     h_rms = np.sqrt(variance.sum())
-    law = Law(spectrum, top / h_rms)
+    law = SpectrumLaw(spectrum, top / h_rms)
     g = spectrum.gradient * h_rms
     touching = area > 0.002
     for quantity, found, exact in (
@@ -376,7 +376,7 @@ def test_measured_surfaces_that_are_not_valid_are_those_that_boundary_elements_c
             law = (
                 one.map_law(shipped().constants, MAP_CONSTANTS)
                 if by_map
-                else Law(one.own_spectrum, one.h_max)
+                else SpectrumLaw(one.own_spectrum, one.h_max)
             )
             distance = np.sqrt(np.mean(errors(one, law, "area")[tested] ** 2))
             valid = not surface.departures(by_map)
@@ -442,7 +442,7 @@ def test_loads_of_surfaces_with_a_peak_far_out(h_max, entries):
 )
 def test_errors_hold_next_to_last_contact(hurst, zeta_1, top):
     surface = Surface(hurst, 1.0, zeta_1, 1.0, top)
-    law = Law(Spectrum.self_affine(hurst, zeta_1), top)
+    law = SpectrumLaw(Spectrum.self_affine(hurst, zeta_1), top)
     nodes, weights = np.polynomial.legendre.leggauss(12)
     u = top * (1 - 10.0 ** -np.arange(1.5, 13))
     found = contact(surface, mean_separation=u, theory="calibrated")
@@ -484,7 +484,7 @@ def test_energies_take_few_forces(top, monkeypatch):
 def test_full_contact_holds_all_energy():
     # U = (1/4) sum q |h_q|^2
     surface = Spectrum.self_affine(0.8, 64.0)
-    assert Law(surface).energy(6.0) == pytest.approx(
+    assert SpectrumLaw(surface).energy(6.0) == pytest.approx(
         surface.x @ surface.variance / surface.gradient / 4, rel=1e-9
     )
 
@@ -515,7 +515,9 @@ def test_published_simulations(rows, gradient):
     )
     # every atom that touches counts whole in GFMD, at the rim too
     law = (
-        Law(plateau, 3.45) if rows is CHALLENGE else Law(Spectrum.self_affine(0.8, 100.0))
+        SpectrumLaw(plateau, 3.45)
+        if rows is CHALLENGE
+        else SpectrumLaw(Spectrum.self_affine(0.8, 100.0))
     )
     force, area, gap = np.array(rows).T
     force = force / gradient

@@ -11,8 +11,8 @@ from mbma_tables import Bodies, Surface, contact
 from mbma_tables.theories.calibrated.formulas import (
     CONSTANTS,
     YANG_PERSSON,
-    Law,
     Spectrum,
+    SpectrumLaw,
 )
 from mbma_tables.theories.calibrated.spectra import Spectra, self_affine_laws
 
@@ -108,7 +108,7 @@ def test_random_surfaces_are_as_by_the_law_of_each():
         hurst, zeta = rng.uniform(0.02, 1.0), 10 ** rng.uniform(0.5, 8.0)
         h_max = rng.uniform(2.5, 12.0)
         spectrum = Spectrum.self_affine(hurst, zeta)
-        law = Law(spectrum, h_max)
+        law = SpectrumLaw(spectrum, h_max)
         many = Spectra(
             self_affine_laws(np.array([hurst]), np.array([zeta])),
             np.array([spectrum.alpha]),

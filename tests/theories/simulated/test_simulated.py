@@ -13,7 +13,9 @@ from generate.machined import makers
 from generate.machined.makers import Part
 from mbma_tables import Bodies, InputError, OutOfRangeError, Surface, contact, contact_law
 from mbma_tables.theories import BoundaryElements, Simulated
-from mbma_tables.theories.simulated.boundary_elements import Contact as OwnContact
+from mbma_tables.theories.simulated.boundary_elements import (
+    BoundaryElementContact as OwnContact,
+)
 from mbma_tables.theories.simulated.energy_spline import LoadCurve
 from mbma_tables.theories.simulated.own_map import law_loads
 from mbma_tables.theories.simulated.reynolds import flow_conductance

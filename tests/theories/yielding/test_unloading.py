@@ -21,7 +21,7 @@ from mbma_tables import (
 )
 from mbma_tables.surfaces.bearing_curve import bearing
 from mbma_tables.theories import THEORIES, Simulated
-from mbma_tables.theories.simulated.boundary_elements import Contact
+from mbma_tables.theories.simulated.boundary_elements import BoundaryElementContact
 from mbma_tables.theories.yielding import unloading as law
 from mbma_tables.theories.yielding.theory import Yielding
 
@@ -215,7 +215,7 @@ def test_residual_heights_hold_the_load_that_made_them():
     """The flattened map bears the same pressures elastically, over the same gaps, and less beyond."""
     heights = random_map(64, 0.05, 0.2)
     heights = heights / bearing(heights, (64.0, 64.0)).gradient
-    loaded = Contact(heights, (64.0, 64.0), hardness=0.25)
+    loaded = BoundaryElementContact(heights, (64.0, 64.0), hardness=0.25)
     found = loaded.press(0.02)
     after = loaded.unloading()
     again = after.press(0.02)
@@ -224,7 +224,7 @@ def test_residual_heights_hold_the_load_that_made_them():
     flattened = loaded.residual_heights() < loaded.surface
     assert 0.01 < flattened.mean() < 0.2
     assert (loaded.traction[flattened] >= 0.25 * (1 - 1e-9)).all()
-    virgin = Contact(heights, (64.0, 64.0), hardness=0.25)
+    virgin = BoundaryElementContact(heights, (64.0, 64.0), hardness=0.25)
     assert after.press(0.005)["area"] > 1.5 * virgin.press(0.005)["area"]
 
 
@@ -312,7 +312,7 @@ def test_a_simulated_map_is_unloaded_itself():
     pressures = largest * np.array([1.0, 0.72, 0.4, 0.16])
     theory = Simulated(grid="full")
     pressed = contact(surface, bodies, pressure=pressures, theory=theory)
-    engine = Contact(heights, (64.0, 64.0), 1e-7, hardness)
+    engine = BoundaryElementContact(heights, (64.0, 64.0), 1e-7, hardness)
     loaded = engine.press(largest)
     after = engine.unloading()
     rows = []

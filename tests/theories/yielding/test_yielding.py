@@ -17,7 +17,10 @@ from mbma_tables import Bodies, InputError, OutOfRangeError, Surface, contact, c
 from mbma_tables.surfaces.bearing_curve import bearing
 from mbma_tables.theories import THEORIES, Mbma, resolve
 from mbma_tables.theories.evidence import shipped_deviations, shipped_part
-from mbma_tables.theories.simulated.boundary_elements import Contact, project
+from mbma_tables.theories.simulated.boundary_elements import (
+    BoundaryElementContact,
+    project,
+)
 from mbma_tables.theories.yielding import formulas as hardness
 from mbma_tables.theories.yielding.theory import MANY, Yielding
 
@@ -558,7 +561,8 @@ def test_capped_boundary_elements(recipe):
     unscaled = heights(recipe)
     surface = unscaled / bearing(unscaled, recipe.sizes).gradient
     elastic, capped = (
-        Contact(surface, recipe.sizes, hardness=cap) for cap in (np.inf, 0.2)
+        BoundaryElementContact(surface, recipe.sizes, hardness=cap)
+        for cap in (np.inf, 0.2)
     )
     for force in (0.01, 0.1):
         free = elastic.press(force)
