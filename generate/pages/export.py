@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from generate.page import Measured, table
 from mbma_tables.export.registry import targets
-from mbma_tables.export.targets import AGAINST, Target
+from mbma_tables.export.targets import Target
 
 
 def formats() -> Measured:
@@ -25,9 +25,7 @@ def formats() -> Measured:
 
 def _quantities(target: Target) -> str:
     """Which quantities a file can have, and how many."""
-    taken = ", ".join(f"`{name}`" for name in target.quantities)
-    if target.quantities == tuple(AGAINST):
-        taken = "any"
+    taken = ", ".join(f"`{name}`" for name in target.quantities) or "any"
     return f"{taken}; several in one file" if target.several else taken
 
 

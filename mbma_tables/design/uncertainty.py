@@ -51,16 +51,6 @@ DEGREE = 5  # of the polynomials whose variances are the shares of inputs
 MOST_DRAWS = 10**6
 # corners of the box of ranges are all looked at up to this number of inputs
 MOST_CORNERS = 8
-# kinds of spreads of processes by the model uncertainty of a quantity at a pressure
-SPREADS = {
-    "area_scatter": "area",
-    "separation_scatter": "gap",
-    "stiffness_scatter": "stiffness",
-    "unloading_stiffness_scatter": "stiffness",
-    "solid_conductance_scatter": "stiffness",
-    "total_conductance_scatter": "stiffness",
-    "gas_conductance_scatter": "gap",
-}
 LOAD = "pressure"  # the name of the share of pressures that are ranges
 Pressed = Callable[[Any], Contact]
 
@@ -180,7 +170,7 @@ def relative_scatter(pressed: Contact, name: str) -> Any:
     declared = registry.get(name)
     if declared.uncertainty is None or not declared.error_sign:
         return np.nan * pressed.mean_separation
-    kind = SPREADS.get(declared.uncertainty)
+    kind = registry.get(declared.uncertainty).spread_of_process
     provenance = pressed.surface.provenance
     spread = spread_of_processes(provenance, kind) if kind else 0.0
     if spread > 0 and not np.isfinite(pressed.scatter_of(name)).all():

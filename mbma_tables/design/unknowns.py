@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import DIMENSIONS, factor
 from mbma_tables.contacts.contact import contact_of
+from mbma_tables.contacts.quantities import registry
 from mbma_tables.contacts.quantities.interface import Interface
 from mbma_tables.contacts.question import GAPS
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -96,20 +97,6 @@ class OfOneMap(Unknowns):
     bodies of modulus E* a/l, at gaps 1/a times as large.
     """
 
-    #: powers of `a` and `l` by which a quantity is larger than in the contact of the map
-    powers: ClassVar[Mapping[str, tuple[int, int]]] = {
-        "mean_separation": (1, 0),
-        "separation": (1, 0),
-        "pressure": (0, 0),
-        "mean_pressure": (0, 0),
-        "area": (0, 0),
-        "stiffness": (-1, 0),
-        "unloading_stiffness": (-1, 0),
-        "tangential_stiffness": (-1, 0),
-        "energy": (1, 0),
-        "solid_conductance": (0, -1),
-    }
-
     def answers(
         self, numbers: Mapping[str, Any], asked: Asked, names: Sequence[str]
     ) -> dict[str, Any]:
@@ -117,7 +104,7 @@ class OfOneMap(Unknowns):
         heights = numbers["heights"]
         lengths = numbers["lengths"]
         equal_modulus = asked.bodies.E_star * heights / lengths
-        scale = heights ** self.powers[asked.by][0]
+        scale = heights ** _similarity(asked.by)[0]
         equal = dataclasses.replace(
             asked,
             bodies=dataclasses.replace(asked.bodies, E_star=equal_modulus),
@@ -126,14 +113,21 @@ class OfOneMap(Unknowns):
         pressed = equal.contact(self.make())
         answers = {}
         for name in names:
-            of_heights, of_lengths = self.powers[name]
+            of_heights, of_lengths = _similarity(name)
             factors = heights**of_heights * lengths**of_lengths
             answers[name] = factors * pressed.quantity(name)
         return answers
 
     def knows(self, name: str) -> bool:
         """Whether a quantity follows by similarity."""
-        return name in self.powers
+        return registry.get(name).similarity is not None
+
+
+def _similarity(name: str) -> tuple[int, int]:
+    """Powers of `a` and `l` by which a quantity is larger than in the contact of the map."""
+    powers = registry.get(name).similarity
+    assert powers is not None
+    return powers
 
 
 def unknowns_of(

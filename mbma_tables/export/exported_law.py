@@ -14,7 +14,7 @@ from mbma_tables.bodies.bodies import Bodies, after
 from mbma_tables.bodies.materials import ELASTIC_PSI
 from mbma_tables.common.arguments import FloatArray, Numbers, number_in
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.units import factor, in_unit
+from mbma_tables.common.units import Units, factor, in_unit
 from mbma_tables.contacts.contact import contact
 from mbma_tables.contacts.law import block as at
 from mbma_tables.contacts.law.law import ContactLaw
@@ -23,6 +23,7 @@ from mbma_tables.contacts.law.make import law_of
 from mbma_tables.contacts.quantities.conductances import conductance_of_gas
 from mbma_tables.contacts.quantities.gas import VACUUM
 from mbma_tables.contacts.quantities.interface import NOTHING_BETWEEN, Gas, Interface
+from mbma_tables.contacts.quantities.stiffnesses import tangential_stiffness
 from mbma_tables.effects.force_law import ForceLaw
 from mbma_tables.effects.rough_contact import pressed
 from mbma_tables.export.text import about, number
@@ -88,6 +89,11 @@ class ExportedLaw:
     force: ForceLaw | None = None
 
     @property
+    def units(self) -> Units:
+        """Of length and of stress."""
+        return Units(self.length, self.stress)
+
+    @property
     def ends(self) -> bool:
         """Whether contact ends at c = 0, and pressure is zero below."""
         return self.law.highest == np.inf
@@ -131,7 +137,7 @@ class ExportedLaw:
         kappa: Any = None,
     ) -> tuple[float, str]:
         """Conductance, or tangential stiffness, over the law's slope, and its unit; of k_s, or of normal stiffness."""
-        if quantity == "tangential_stiffness":
+        if quantity == tangential_stiffness.name:
             return 1 / number_in("kappa", kappa, *KAPPA), f"{self.stress}/{self.length}"
         if conductivity is None:
             raise InputError(

@@ -25,6 +25,8 @@ from mbma_tables.common.plots import draw_line
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# the table of `flow_factors`, which is of several quantities
+FILM = "film"
 MIN_ROWS = 3
 MAX_ROWS = 5000
 DIGITS = 10  # of rows, which are shorter to read; files hold exactly these
@@ -60,7 +62,7 @@ class LawTable(Displayed):
     @property
     def quantity(self) -> str:
         """See `describe_law`."""
-        return "film" if self.x_name == "mean_separation" else self.y_name
+        return FILM if self.x_name == "mean_separation" else self.y_name
 
     @property
     def title(self) -> str:

@@ -21,18 +21,20 @@ from mbma_tables.contacts.quantities.interface import (
     Gas,
     Interface,
 )
+from mbma_tables.contacts.quantities.leakage import flow_coefficient
 from mbma_tables.contacts.quantities.tangential import ratio_on
 from mbma_tables.export.code.languages import LANGUAGES
 from mbma_tables.export.exported_law import GasInGaps
-from mbma_tables.export.law_table import LawTable
+from mbma_tables.export.law_table import FILM, LawTable
 from mbma_tables.export.registry import targets
 from mbma_tables.export.rows.law_rows import describe_law
 from mbma_tables.export.targets import (
-    AGAINST,
     CONDUCTANCES,
-    OPTIONS,
     Options,
     Target,
+    follows,
+    has_gas,
+    options_of,
     require_quantity,
     write_files,
 )
@@ -250,13 +252,12 @@ def _all_rows(
     """Rows of one quantity, or of several."""
     leakage = shared.pop("leakage", False)
     wanted = _quantities(subject, program, options, leakage)
-    if options.direction is not None and not {"leakage", "hydraulic_aperture"} & {
-        *wanted
-    }:
+    flows = [name for name in wanted if follows(name) == flow_coefficient.name]
+    if options.direction is not None and not flows:
         raise InputError("direction is of leakage: ask for leakage or leave it out")
     if options.pressures is not None:
         shared["pressures"] = options.pressures
-    elif subject.is_joint and wanted != ["film"]:
+    elif subject.is_joint and wanted != [FILM]:
         raise InputError(
             f"{program.name} needs pressures, the smallest and the largest, such as ('1 MPa', '50 MPa')"
         )
@@ -275,8 +276,7 @@ def _refuse_unused(subject: Subject, wanted: Sequence[str]) -> None:
     """Refuse what was asked for and no quantity uses."""
     needed: set[str] = set()
     for name in wanted:
-        # any other quantity may need the conductivity of the bodies
-        needed |= OPTIONS.get(name, set()) if name in AGAINST else {"conductivity"}
+        needed |= options_of(name)
     unused = []
     if subject.heat is not None and "conductivity" not in needed:
         unused.append("conductivity")
@@ -374,7 +374,7 @@ def _usual(subject: Subject, program: Target, heat: bool | None) -> str:
     conducts = heat or (heat is None and (subject.is_joint or subject.heat is not None))
     is_vacuum = subject.gas is None or subject.gas.name == VACUUM
     of_subject = CONDUCTANCES[1:] if is_vacuum else CONDUCTANCES
-    taken = [name for name in of_subject if name in program.quantities]
+    taken = [name for name in of_subject if program.takes_rows(name)]
     return taken[0] if taken and conducts else program.quantity
 
 
@@ -420,7 +420,7 @@ def _conductivity(
     if subject.heat is not None:
         return subject.heat(units)
     # of a program whose numbers do not depend on the conductivity
-    if program.quantity == "solid_conductance":
+    if program.quantity in CONDUCTANCES:
         return {"conductivity": 1.0, "conductivity_unit": "W/(m K)"}, math.nan
     if subject.bodies is None:
         raise InputError(
@@ -442,11 +442,12 @@ def _rows(
 ) -> LawTable:
     """Rows of one quantity."""
     asked = dict(shared)
-    if quantity not in ("leakage", "hydraulic_aperture"):
+    of_law = follows(quantity)
+    if of_law != flow_coefficient.name:
         asked.pop("direction", None)
-    if quantity != "film":
+    if quantity != FILM:
         asked.pop("peklenik", None)
-    if quantity not in AGAINST and subject.bodies is not None:
+    if not of_law and quantity != FILM and subject.bodies is not None:
         # of the contact itself
         del asked["hardness"]
         asked.pop("largest_pressure", None)
@@ -463,11 +464,13 @@ def _rows(
     if quantity in CONDUCTANCES:
         heat, unit = _conductivity(subject, program, units)
         asked |= heat
-        if quantity == "total_conductance" and subject.gas is not None:
+        if has_gas(quantity) and subject.gas is not None:
             asked["gas"] = GasInGaps(subject.gas, unit)
-    elif quantity not in AGAINST and subject.heat is not None:
+    elif (
+        not of_law and subject.heat is not None and "conductivity" in options_of(quantity)
+    ):
         asked |= subject.heat(units)[0]
-    if rubbed or quantity == "tangential_stiffness":
+    if rubbed or (of_law and "kappa" in options_of(quantity)):
         asked["kappa"] = subject.kappa
     return describe_law(subject.surface, subject.E_star, quantity=quantity, **asked)
 

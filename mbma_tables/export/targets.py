@@ -10,8 +10,14 @@ from typing import Any
 from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
-from mbma_tables.contacts.quantities.registry import conductances, get, registry
-from mbma_tables.export.law_table import Curve, LawTable
+from mbma_tables.contacts.quantities.conductances import GAS
+from mbma_tables.contacts.quantities.registry import (
+    conductances,
+    get,
+    in_files,
+    needs_of,
+)
+from mbma_tables.export.law_table import FILM, Curve, LawTable
 from mbma_tables.export.text import checked_name, comment
 
 LAW = frozenset(
@@ -29,22 +35,37 @@ STAY_WITHIN_ROWS = (
 )
 MAX_NAME = 80  # letters of a name, as CalculiX and Abaqus read them
 # those that the solid spots have a part in: of spots and gas together, and of the spots alone
-CONDUCTANCES = tuple(name for name in conductances() if get(name).made_of)
-# by quantity: options for it alone, and the abscissa of its rows; any other quantity of the
-# registry has rows against pressure
-OPTIONS = {
-    **{name: {"conductivity", "conductivity_unit"} for name in CONDUCTANCES},
-    "tangential_stiffness": {"kappa"},
-    "film": {"peklenik"},
-}
-AGAINST = {
-    "pressure": "overclosure",
-    **dict.fromkeys(CONDUCTANCES, "pressure"),
-    "tangential_stiffness": "pressure",
-    "leakage": "pressure",
-    "hydraulic_aperture": "pressure",
-    "film": "mean_separation",
-}
+CONDUCTANCES = tuple(name for name in conductances() if get(name).follows)
+
+
+def names_of_rows() -> list[str]:
+    """Names that rows can be asked for: of the quantities of the registry, and a film."""
+    return [*in_files(), FILM]
+
+
+def follows(name: str) -> str:
+    """The quantity of a law that rows follow from; empty of a film, and of those of contacts."""
+    return "" if name == FILM else in_files()[name].follows
+
+
+def has_gas(name: str) -> bool:
+    """Whether a gas conducts beside the solid spots in rows that follow from a law."""
+    return bool(follows(name)) and GAS in needs_of(in_files()[name].name)
+
+
+def against(name: str) -> str:
+    """The abscissa of rows; that of a film, which is several quantities, is the mean gap."""
+    return "mean_separation" if name == FILM else in_files()[name].against
+
+
+def options_of(name: str) -> set[str]:
+    """Options that belong to rows: those that give what the quantity needs."""
+    if name == FILM:
+        return {"peklenik"}
+    options: set[str] = set()
+    for need in needs_of(in_files()[name].name):
+        options.update(need.options)
+    return options
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -94,9 +115,9 @@ class Target:
     most: Mapping[str, int] = dataclasses.field(
         default_factory=dict
     )  # rows that the program keeps, by quantity
-    quantities: tuple[
-        str, ...
-    ] = ()  # of rows, which the program takes; several in one file where `several`
+    # of rows, which the program takes, all where it is empty; several in one file where
+    # `several`
+    quantities: tuple[str, ...] = ()
     several: bool = False
     alone: bool = True  # whether the first file can be used without those beside it
     beside: tuple[str, ...] = ()  # ends of the names of other files
@@ -106,6 +127,10 @@ class Target:
     longest_name: int | None = None  # letters of a name, where one stands in the file
     # curves that the first file of rows has
     read: Callable[[bytes], list[Curve]] | None = None
+
+    def takes_rows(self, name: str) -> bool:
+        """Whether the program takes rows of a quantity."""
+        return self.rows and (not self.quantities or name in self.quantities)
 
     def place_of_name(
         self, name: str | None, out: pathlib.Path | None
@@ -222,7 +247,7 @@ class RowFormat:
         """Refuse a law that the program does not take."""
         own = tuple(law.facts[fact][1] for fact in ("h_rms", "E_star"))
         most = self.most.get(law.y_name, law.x.size)
-        taken = " or ".join(f"{y} against {AGAINST[y]}" for y in self.body)
+        taken = " or ".join(f"{y} against {against(y)}" for y in self.body)
         for allowed, takes, got in (
             (
                 self.of_any is not None or law.quantity in self.body,
@@ -242,12 +267,13 @@ class RowFormat:
 
     def target(self) -> Target:
         """The same as a target."""
-        quantities = self.body if self.of_any is None else OPTIONS
+        quantities = tuple(self.body) if self.of_any is None else ()
         of_any: set[str] = set()
         own: set[str] = set()
-        for quantity, options in OPTIONS.items():
+        for name in names_of_rows():
+            options = options_of(name)
             of_any |= options
-            own |= options if quantity in quantities else set()
+            own |= options if name in (quantities or names_of_rows()) else set()
         takes = (
             (ROWS - of_any)
             | own
@@ -261,7 +287,7 @@ class RowFormat:
             quantity=next(iter(self.body), "pressure"),
             units=self.units,
             most=self.most,
-            quantities=tuple(self.body or AGAINST),
+            quantities=quantities,
             several=self.several is not None,
             output=self.output,
             tested=self.tested,
@@ -292,5 +318,5 @@ def write_files(out: pathlib.Path, files: Mapping[str, bytes]) -> list[pathlib.P
 
 
 def require_quantity(name: str) -> None:
-    """Refuse a name that is no quantity of rows: neither one of `AGAINST` nor one of the registry."""
-    require_name("quantity of rows", name, dict.fromkeys((*AGAINST, *registry())))
+    """Refuse a name that is no quantity of rows."""
+    require_name("quantity of rows", name, dict.fromkeys(names_of_rows()))

@@ -50,7 +50,7 @@ def run(*arguments):
 OF_PRESSURE = [
     name
     for name, kind in targets("SOLVERS", "DATA").items()
-    if "pressure" in kind.quantities
+    if kind.takes_rows("pressure")
 ]
 
 

@@ -14,7 +14,7 @@ from mbma_tables.export.registry import targets
 from mbma_tables.export.rows.solvers import FORMATS
 
 # formats of rows of pressure
-PLAIN = [name for name in FORMATS if "pressure" in targets()[name].quantities]
+PLAIN = [name for name in FORMATS if targets()[name].takes_rows("pressure")]
 POINTS = 10_000
 # what agreement is asked of exported laws
 VALUES = 1e-13

@@ -416,5 +416,4 @@ test_refused = refusals(
     ("mbdyn", FILM | {"rows": 2}, {}, "rows must be a whole number in"),
     ("mbdyn", {"peklenik": 2.0}, {}, "peklenik does not belong to quantity='pressure'"),
     ("mbdyn", FILM | {"peklenik": 20.0}, {}, "peklenik"),
-    ("lsdyna", FILM, {}, "LS-DYNA takes pressure against overclosure"),
 )

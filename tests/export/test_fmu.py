@@ -163,11 +163,10 @@ def test_description():
     read = fmpy.read_model_description(
         io.BytesIO(made("calibrated", **MORE)), validate=True
     )
-    assert [variable.name for variable in read.modelVariables] == [
-        "time",
-        "overclosure",
-        *QUANTITIES,
-    ]
+    inputs = [variable.name for variable in read.modelVariables[:2]]
+    outputs = [variable.name for variable in read.modelVariables[2:]]
+    assert inputs == ["time", "overclosure"]
+    assert sorted(outputs) == sorted(QUANTITIES)
     units = {variable.name: variable.unit for variable in read.modelVariables}
     assert units["tangent"] == "MPa/mm"
     assert units["solid_conductance"] == "mW/(mm K)/mm"
@@ -234,7 +233,8 @@ def test_an_fmu_runs_as_it_is(tmp_path):
             known.energy,
             law.leakage(3 - c),
         ]
-        np.testing.assert_allclose(list(found)[1:], expected, rtol=1e-12)
+        answers = [found[name] for name in asked["output"]]
+        np.testing.assert_allclose(answers, expected, rtol=1e-12)
     said = fmpy.read_model_description(str(tmp_path / "road.fmu")).description
     (folder,) = {
         name.split("/")[1]
@@ -296,7 +296,8 @@ def test_an_fmu_of_fmi_3_is_the_same_law(tmp_path):
         found = fmpy.simulate_fmu(str(path), stop_time=1.0, fmi_type=kind, **asked)[-1]
         known = law.values(3 - 0.75)
         expected = [known.pressure, known.stiffness, known.area, known.energy]
-        np.testing.assert_allclose(list(found)[1:5], expected, rtol=1e-12)
+        answers = [found[name] for name in QUANTITIES[:4]]
+        np.testing.assert_allclose(answers, expected, rtol=1e-12)
         conductance = CONDUCTIVITY / 13.3 * known.stiffness
         sheared, leaked = known.stiffness / KAPPA, float(law.leakage(3 - 0.75))
         more = [conductance, sheared, leaked]

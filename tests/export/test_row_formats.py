@@ -12,7 +12,7 @@ from mbma_tables import InputError, Surface
 from mbma_tables.export.registry import targets
 from mbma_tables.export.rows.law_rows import describe_law
 from mbma_tables.export.rows.solvers import FORMATS
-from mbma_tables.export.targets import AGAINST
+from mbma_tables.export.targets import follows, names_of_rows
 
 OF_ROWS = targets("SOLVERS", "DATA")
 OF_REGISTRY = "mean_pressure"
@@ -119,6 +119,14 @@ def assert_reads(kind, law, curves):
         assert len(curves) == len(law.columns) - 1
 
 
+def quantities_of(kind):
+    """Names of rows that a program takes: of any those that follow from a law, a film, and one of contacts."""
+    taken = [name for name in names_of_rows() if kind.takes_rows(name)]
+    return [
+        name for name in taken if name == "film" or follows(name) or name == OF_REGISTRY
+    ]
+
+
 def skip_without_package(name):
     if name == "parquet":
         pytest.importorskip("pyarrow")
@@ -128,8 +136,7 @@ def skip_without_package(name):
 def test_a_program_reads_the_rows_of_random_laws(name):
     skip_without_package(name)
     kind = OF_ROWS[name]
-    takes_any = kind.quantities == tuple(AGAINST)
-    quantities = [*kind.quantities, *([OF_REGISTRY] if takes_any else [])]
+    quantities = quantities_of(kind)
     rng = np.random.default_rng(56)
     for count in range(LAWS):
         quantity = quantities[count % len(quantities)]
@@ -142,7 +149,7 @@ def test_a_program_reads_the_rows_of_random_laws(name):
 @pytest.mark.parametrize("name", [key for key, kind in OF_ROWS.items() if kind.several])
 def test_several_laws_in_a_file_are_read_back(name):
     kind = OF_ROWS[name]
-    wanted = [each for each in ("pressure", "leakage", "film") if each in kind.quantities]
+    wanted = [each for each in ("pressure", "leakage", "film") if kind.takes_rows(each)]
     laws = [law_of(each, 0) for each in wanted]
     curves = kind.read(written(kind, laws))
     for law in laws:
@@ -157,7 +164,7 @@ def test_every_number_below_the_comments_has_a_point(name):
     """Programs that read whole numbers as integers of 32 bits turn 3240000000 into -1054967296."""
     row_format = FORMATS[name]
     kind = OF_ROWS[name]
-    for quantity in kind.quantities:
+    for quantity in quantities_of(kind):
         law = law_of(quantity, 0)
         whole = dataclasses.replace(
             law,
@@ -179,7 +186,7 @@ def test_every_number_below_the_comments_has_a_point(name):
 @pytest.mark.parametrize("name", FORMATS)
 def test_no_text_of_a_user_is_code(name):
     row_format = FORMATS[name]
-    law = law_of(next(iter(OF_ROWS[name].quantities)), 0)
+    law = law_of(quantities_of(OF_ROWS[name])[0], 0)
     words = {"comments": (HOSTILE, *law.comments[1:], HOSTILE)}
     if row_format.units is None:
         words |= {"x_unit": HOSTILE, "y_unit": HOSTILE}
@@ -193,7 +200,7 @@ def test_no_text_of_a_user_is_code(name):
 @pytest.mark.parametrize("name", [key for key, each in FORMATS.items() if each.named])
 def test_a_name_is_a_word_within_the_length(name):
     row_format = FORMATS[name]
-    law = law_of(next(iter(OF_ROWS[name].quantities)), 0)
+    law = law_of(quantities_of(OF_ROWS[name])[0], 0)
     longest = "A" * row_format.longest_name
     assert longest in row_format(law, longest)
     for bad in ("A\n*INCLUDE, INPUT=evil", "A, B", "", "1", "é", f"{longest}A", 3):

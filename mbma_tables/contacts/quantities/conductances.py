@@ -52,6 +52,7 @@ CONDUCTIVITY = Need(
     "conductivity",
     _has_conductivity,
     "that of the bodies, Bodies(..., conductivity='45 W/(m K)'), or named metals",
+    options=("conductivity", "conductivity_unit"),
 )
 UNIT_OF_CONDUCTANCE = Need(
     "a unit of length beside conductivities with theirs",
@@ -75,6 +76,7 @@ UNIT_OF_LENGTH = Need(
     "thermal conductance of solid spots and gas in parallel, per nominal area",
     needs=(THERMAL_CONDUCTIVITY,),
     made_of=("solid_conductance", "gas_conductance"),
+    follows="unloading_stiffness",
     uncertainty="total_conductance_scatter",
 )
 def total_conductance(contact: State) -> Any:
@@ -88,7 +90,9 @@ def total_conductance(contact: State) -> Any:
     needs=(CONDUCTIVITY, UNIT_OF_CONDUCTANCE),
     uncertainty="solid_conductance_scatter",
     made_of=("unloading_stiffness",),
+    follows="unloading_stiffness",
     unit_of_state=lambda contact: contact.bodies.conductivity[1],
+    similarity=(0, -1),
 )
 def solid_conductance(contact: State) -> Any:
     """Thermal or electrical conductance of the solid spots, h = (k_s/E*) (-dF/du), at constant contact area.
@@ -124,6 +128,7 @@ def gas_conductance(contact: State) -> Any:
     "model uncertainty: standard deviation of ln of the total conductance at this pressure",
     made_of=("total_conductance",),
     is_column=False,
+    spread_of_process="stiffness",
 )
 def total_conductance_scatter(contact: State) -> Any:
     """Model uncertainty, one standard deviation of ln `total_conductance` at this pressure.
@@ -142,6 +147,7 @@ def total_conductance_scatter(contact: State) -> Any:
     "model uncertainty: standard deviation of ln of the solid conductance at this pressure",
     made_of=("solid_conductance",),
     is_column=False,
+    spread_of_process="stiffness",
 )
 def solid_conductance_scatter(contact: State) -> Any:
     """Model uncertainty, one standard deviation of ln `solid_conductance` at this pressure.
@@ -157,6 +163,7 @@ def solid_conductance_scatter(contact: State) -> Any:
     "model uncertainty: standard deviation of ln of the gas conductance at this pressure",
     made_of=("gas_conductance",),
     is_column=False,
+    spread_of_process="gap",
 )
 def gas_conductance_scatter(contact: State) -> Any:
     """Model uncertainty, one standard deviation of ln `gas_conductance` at this pressure; 0 in vacuum.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,6 +35,13 @@ def of_elastic_contacts(state: State) -> bool:
     return not state.yields
 
 
+class LawFunction(NamedTuple):
+    """The function of a quantity that every law as code has."""
+
+    name: str
+    meaning: str = ""  # along loading; that of the quantity where it is empty
+
+
 @dataclasses.dataclass(frozen=True)
 class Quantity:
     """Declaration of a quantity, all that anyone who shows it needs to know."""
@@ -59,6 +66,19 @@ class Quantity:
     unit_of_state: Callable[[State], str] | None = (
         None  # where the unit depends on what the user gave
     )
+    #: abscissa of its rows in files for other programs
+    against: str = "pressure"
+    #: quantity of a law that such rows follow from, by a factor or a power, and the
+    #: conductance of a gas beside it; empty where they are those of contacts
+    follows: str = ""
+    #: its further name in such files
+    name_in_files: str = ""
+    law_function: LawFunction | None = None
+    #: of a model uncertainty: the kind of the spread that faces of a process have beside it
+    spread_of_process: str = ""
+    #: powers of factors of heights and lengths by which it is larger where both of a map,
+    #: and the modulus by their ratio, are: a contact similar to that of the map
+    similarity: tuple[int, int] | None = None
 
     @property
     def is_result(self) -> bool:

@@ -732,6 +732,8 @@ def flow(surface: Any, mean_separation: FloatArray, area: FloatArray) -> FloatAr
     error_sign=-1,
     is_column=False,
     is_listed=on_request,
+    follows="flow_coefficient",
+    name_in_files="leakage",
 )
 def flow_coefficient(contact: State) -> Any:
     """Flow coefficient K of the gaps [length^3], `leakage.K`."""
@@ -744,6 +746,7 @@ def flow_coefficient(contact: State) -> Any:
     made_of=("flow_coefficient",),
     is_column=False,
     is_listed=on_request,
+    follows="flow_coefficient",
 )
 def hydraulic_aperture(contact: State) -> Any:
     """K^(1/3) [length], the gap of parallel plates with the same flow."""

@@ -8,6 +8,7 @@ from mbma_tables.bodies.materials import ELASTIC_PSI
 from mbma_tables.common.units import Dimension
 from mbma_tables.contacts.quantities.declaration import (
     DIMENSIONLESS,
+    LawFunction,
     of_yielding_contacts,
     quantity,
 )
@@ -21,13 +22,28 @@ def _in_shape(contact: State, value: Any) -> Any:
     return 0.0 * contact.mean_separation + value if np.ndim(value) else value[()]
 
 
-@quantity(STRESS, "force over nominal area", uncertainty="scatter", error_sign=0)
+@quantity(
+    STRESS,
+    "force over nominal area",
+    uncertainty="scatter",
+    error_sign=0,
+    against="overclosure",
+    follows="pressure",
+    law_function=LawFunction("pressure"),
+    similarity=(0, 0),
+)
 def pressure(contact: State) -> Any:
     """F/A0 in the unit of E*; F/(A0 E*) where that is 1."""
     return contact.answered("pressure")
 
 
-@quantity(DIMENSIONLESS, "real over nominal contact area", uncertainty="area_scatter")
+@quantity(
+    DIMENSIONLESS,
+    "real over nominal contact area",
+    uncertainty="area_scatter",
+    law_function=LawFunction("area"),
+    similarity=(0, 0),
+)
 def area(contact: State) -> Any:
     """A/A0; that of MBMA does not end at 1 under full compression, and is not clamped."""
     return contact.answered("area")
@@ -39,6 +55,7 @@ def area(contact: State) -> Any:
     uncertainty="area_scatter",
     error_sign=-1,
     is_column=False,
+    similarity=(0, 0),
 )
 def mean_pressure(contact: State) -> Any:
     """Mean pressure in the contact, F/A [stress]; NaN where there is none."""

@@ -16,6 +16,7 @@ from mbma_tables.common import units as of_arguments
 from mbma_tables.common.arguments import require_name
 from mbma_tables.common.units import HEAT_CONDUCTANCE, Units
 from mbma_tables.contacts.quantities.declaration import Quantity
+from mbma_tables.contacts.quantities.state import Need
 
 #: modules that declare quantities, in the order in which these are shown
 MODULES = [
@@ -72,6 +73,33 @@ def conductances() -> list[str]:
         for name, declared in registry().items()
         if declared.dimension == HEAT_CONDUCTANCE
     ]
+
+
+def needs_of(name: str) -> list[Need]:
+    """What a quantity and those that it is made of need, each once."""
+    declared = get(name)
+    needs = dict.fromkeys(declared.needs)
+    for part in declared.made_of:
+        needs |= dict.fromkeys(needs_of(part))
+    return list(needs)
+
+
+def in_files() -> dict[str, Quantity]:
+    """Quantities by their names in files for other programs: their own and further ones."""
+    quantities = dict(registry())
+    for declared in registry().values():
+        if declared.name_in_files:
+            quantities[declared.name_in_files] = declared
+    return quantities
+
+
+def law_functions() -> dict[str, Quantity]:
+    """Quantities that every law as code has, by the names of their functions."""
+    return {
+        declared.law_function.name: declared
+        for declared in registry().values()
+        if declared.law_function is not None
+    }
 
 
 def get(name: str) -> Quantity:

@@ -10,14 +10,22 @@ LENGTH = Dimension(length=1)
 
 
 @quantity(
-    LENGTH, "mean gap u = (h_max + d)/2", uncertainty="separation_scatter", error_sign=-1
+    LENGTH,
+    "mean gap u = (h_max + d)/2",
+    uncertainty="separation_scatter",
+    error_sign=-1,
+    similarity=(1, 0),
 )
 def mean_separation(contact: State) -> Any:
     """Mean separation u = (h_max + d)/2 (50) [length]: the mean gap, with yielded points flattened."""
     return contact.answered("mean_separation")
 
 
-@quantity(LENGTH, "d, rigid plane to mid-plane")
+@quantity(
+    LENGTH,
+    "d, rigid plane to mid-plane",
+    similarity=(1, 0),
+)
 def separation(contact: State) -> Any:
     """Separation d between the rigid plane and the mid-plane [length]."""
     return contact.answered("separation")

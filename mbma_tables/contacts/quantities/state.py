@@ -24,6 +24,7 @@ class Need:
     name: str  # such as "conductivity"
     is_given: Callable[[State], bool]
     remedy: str  # how to give it
+    options: tuple[str, ...] = ()  # of a file for another program, which give it
 
 
 class State(ContactQuantities, abc.ABC):

@@ -4,6 +4,7 @@ from typing import Any
 
 from mbma_tables.common.units import Dimension
 from mbma_tables.contacts.quantities.declaration import (
+    LawFunction,
     of_elastic_contacts,
     of_yielding_contacts,
     quantity,
@@ -31,6 +32,7 @@ POISSONS_RATIO = Need(
     "nu",
     lambda contact: contact.bodies.bodies.nu is not None,
     "Poisson's ratio of the bodies, Bodies(..., nu=0.3), or named metals",
+    options=("kappa",),
 )
 
 
@@ -38,6 +40,8 @@ POISSONS_RATIO = Need(
     STIFFNESS,
     "-dF/du per nominal area, of first loading",
     uncertainty="stiffness_scatter",
+    law_function=LawFunction("tangent", "derivative of pressure by overclosure"),
+    similarity=(-1, 0),
 )
 def stiffness(contact: State) -> Any:
     """-d(F/A0)/du [stress/length] of first loading, against the mean separation."""
@@ -49,6 +53,7 @@ def stiffness(contact: State) -> Any:
     "-dF/du per nominal area, of a small unloading",
     uncertainty="unloading_stiffness_scatter",
     is_listed=of_yielding_contacts,
+    similarity=(-1, 0),
 )
 def unloading_stiffness(contact: State) -> Any:
     """-d(F/A0)/du [stress/length] of a small unloading at constant contact area; `stiffness` if nothing yields.
@@ -72,6 +77,8 @@ def unloading_stiffness(contact: State) -> Any:
     needs=(POISSONS_RATIO,),
     uncertainty="unloading_stiffness_scatter",
     made_of=("unloading_stiffness",),
+    follows="unloading_stiffness",
+    similarity=(-1, 0),
 )
 def tangential_stiffness(contact: State) -> Any:
     """Tangential stiffness of full stick [stress/length], `unloading_stiffness`/kappa (Mindlin 1949)."""
@@ -86,6 +93,8 @@ def tangential_stiffness(contact: State) -> Any:
     needs=(NO_ADHESION,),
     is_column=False,
     is_listed=of_elastic_contacts,
+    law_function=LawFunction("energy", "integral of pressure over overclosure"),
+    similarity=(1, 0),
 )
 def energy(contact: State) -> Any:
     """Elastic energy per nominal area [stress length] that unloading gives back, the integral of F/A0 over u."""

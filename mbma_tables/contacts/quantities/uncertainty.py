@@ -35,7 +35,11 @@ def scatter(contact: State) -> Any:
     return scatter_of_theory(contact, "pressure")
 
 
-@quantity(DIMENSIONLESS, "model uncertainty: standard deviation of ln A at this pressure")
+@quantity(
+    DIMENSIONLESS,
+    "model uncertainty: standard deviation of ln A at this pressure",
+    spread_of_process="area",
+)
 def area_scatter(contact: State) -> Any:
     """Model uncertainty, one standard deviation of ln A at this pressure."""
     return scatter_of_theory(contact, "area")
@@ -45,6 +49,7 @@ def area_scatter(contact: State) -> Any:
     DIMENSIONLESS,
     "model uncertainty: standard deviation of ln of the loading stiffness at this pressure",
     is_column=False,
+    spread_of_process="stiffness",
 )
 def stiffness_scatter(contact: State) -> Any:
     """Model uncertainty, one standard deviation of ln `stiffness` at this pressure.
@@ -60,6 +65,7 @@ def stiffness_scatter(contact: State) -> Any:
     DIMENSIONLESS,
     "model uncertainty: standard deviation of ln of the unloading stiffness at this pressure",
     is_column=False,
+    spread_of_process="stiffness",
 )
 def unloading_stiffness_scatter(contact: State) -> Any:
     """Model uncertainty, one standard deviation of ln `unloading_stiffness` at this pressure.
@@ -77,6 +83,7 @@ def unloading_stiffness_scatter(contact: State) -> Any:
     Dimension(length=1),
     "model uncertainty: standard deviation of the mean separation at this pressure",
     is_column=False,
+    spread_of_process="gap",
 )
 def separation_scatter(contact: State) -> Any:
     """Model uncertainty of the mean separation at this pressure [length], `scatter` times F/(-dF/du)."""

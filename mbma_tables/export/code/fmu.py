@@ -113,6 +113,7 @@ def fmu(
         "TOKEN": token,
         "START": variables[1]["start"],
         "functions": list(found.functions),
+        "references": [variable["name"] for variable in variables],
         "LEAST": number(exported.c_least, infinity="INFINITY"),
         "MOST": number(exported.c_most),
     }
@@ -197,30 +198,25 @@ def _binaries(
 def _variables(found: AskedLaw) -> list[dict[str, str]]:
     """XML attributes of each variable, by value reference."""
     exported = found.exported
-    length = exported.length
-    stress = exported.stress
     asked = {
         "start": number(0.0 if exported.ends else max(0.0, exported.c_least)),
         "max": number(exported.c_most),
     }
     asked |= {} if exported.ends else {"min": number(exported.c_least)}
-    outputs = {
-        "pressure": (stress, registry.get("pressure").meaning),
-        "tangent": (f"{stress}/{length}", "derivative of pressure by overclosure"),
-        "area": ("1", registry.get("area").meaning),
-        "energy": (f"{stress} {length}", "integral of pressure over overclosure"),
-        **{
-            name: (function.unit, function.meaning)
-            for name, function in found.functions.items()
-        },
-    }
+    outputs = {}
+    for name, declared in registry.law_functions().items():
+        assert declared.law_function is not None
+        meaning = declared.law_function.meaning or declared.meaning
+        outputs[name] = (declared.unit_in(exported.units), meaning)
+    for name, function in found.functions.items():
+        outputs[name] = (function.unit, function.meaning)
     said = "h_max less the mean separation"
     return [
         {"name": "time", "causality": "independent", "unit": "s"},
         {
             "name": "overclosure",
             "causality": "input",
-            "unit": length,
+            "unit": exported.length,
             "description": said,
             **asked,
         },

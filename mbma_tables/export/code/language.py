@@ -6,20 +6,14 @@ from typing import Any, NamedTuple
 
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.contacts.law.law import ContactLaw
+from mbma_tables.contacts.quantities.registry import law_functions
 from mbma_tables.export.code.curves import Curve
 from mbma_tables.export.exported_law import ExportedLaw
 from mbma_tables.export.text import file, number, rendered
 
-# functions of every law; those of other quantities are called by their names
-FUNCTIONS = (
-    "pressure",
-    "tangent",
-    "with_tangent",
-    "curvature",
-    "area",
-    "energy",
-    "overclosure",
-)
+# functions of every law, the last of which are of no quantity; those of other quantities are
+# called by their names
+FUNCTIONS = (*law_functions(), "with_tangent", "curvature", "overclosure")
 NAN = "Outside the range: NaN."
 # folder of templates and evaluators, from that of `export` on
 FOLDER = "code/languages"

@@ -13,7 +13,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import written_bytes
 from mbma_tables.export.law_table import MIN_ROWS, Curve, LawTable
 from mbma_tables.export.reserved_words import matlab_words
-from mbma_tables.export.targets import AGAINST, Target
+from mbma_tables.export.targets import Target
 from mbma_tables.export.text import checked_name, comment, csv_cell, number
 
 MAX_MATLAB_NAME = 63
@@ -317,7 +317,6 @@ def _target(
     return Target(
         name,
         write,
-        quantities=tuple(AGAINST),
         output=output,
         tested=tested,
         read=read,

@@ -15,9 +15,14 @@ from mbma_tables.bodies.bodies import Bodies
 from mbma_tables.common.arguments import FloatArray, hinted, number_in, whole_number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.contacts.law.law import ROUNDING
-from mbma_tables.contacts.quantities import registry
 from mbma_tables.contacts.quantities.effective_medium import LARGEST_AREA
 from mbma_tables.contacts.quantities.interface import NOTHING_BETWEEN, Interface
+from mbma_tables.contacts.quantities.leakage import (
+    flow_coefficient,
+    hydraulic_aperture,
+)
+from mbma_tables.contacts.quantities.registry import in_files, unit_of
+from mbma_tables.contacts.quantities.stiffnesses import unloading_stiffness
 from mbma_tables.effects.film import flow_factors
 from mbma_tables.effects.force_law import ForceLaw
 from mbma_tables.export.exported_law import (
@@ -28,20 +33,27 @@ from mbma_tables.export.exported_law import (
     with_conductivity,
 )
 from mbma_tables.export.law_table import (
+    FILM,
     MAX_ROWS,
     MIN_ROWS,
     LawTable,
     chosen_rows,
     rounded,
 )
-from mbma_tables.export.targets import AGAINST, CONDUCTANCES, require_quantity
+from mbma_tables.export.targets import (
+    CONDUCTANCES,
+    against,
+    follows,
+    has_gas,
+    options_of,
+    require_quantity,
+)
 from mbma_tables.export.text import about, number
 from mbma_tables.islands.variants import Variant
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import Theory, UserTheory
 from mbma_tables.theories.tested import below, elastic_ranges
 
-FLOWS = {"leakage": 1.0, "hydraulic_aperture": 1 / 3}  # powers of the flow coefficient
 OF_FRICTION = 5  # pressures at which a friction card's comments have the stiffness
 # of the largest value, where no range is given: below it, errors are relative to this, not
 # to the value
@@ -100,9 +112,8 @@ def describe_law(
     length_unit, stress_unit : str, optional
         Units of the rows. A surface or modulus that has another one is converted; one that
         has none is in these.
-    quantity : {"pressure", "solid_conductance", "total_conductance", "tangential_stiffness",
-    "leakage", "hydraulic_aperture", "film"} or name
-        Pressure against overclosure, or against pressure the conductance of the solid spots,
+    quantity : str
+        The name of a quantity of contacts, "leakage", or "film": pressure against overclosure, or against pressure the conductance of the solid spots,
         or of these and of a `gas` together, tangential stiffness
         before slip, the flow coefficient k h_rms^3 of the gaps (`ContactLaw.leakage`), or
         the hydraulic aperture k^(1/3) h_rms with the aperture u, the derivative by u and
@@ -162,30 +173,33 @@ def describe_law(
     ('pressure', 'MPa', 'mm', 0.024)
     """
     require_quantity(quantity)
-    of_registry = quantity not in AGAINST
+    film = quantity == FILM
+    of_law = follows(quantity)
+    of_registry = not of_law and not film
     of_body = isinstance(surface, ForceLaw)
     heat = quantity in CONDUCTANCES
-    film = quantity == "film"
+    sticks = of_law == unloading_stiffness.name and not heat
+    belong = options_of(quantity)
     for given, needs, names in (
         (of_body, quantity == "pressure", "a force law"),
         (peklenik is not None, film, "peklenik"),
         (
             conductivity is not None or conductivity_unit is not None,
-            heat or of_registry,
+            "conductivity" in belong,
             "conductivity",
         ),
         (friction is not None, not of_registry, "friction"),
         (kappa is not None, not of_registry or friction is None, "kappa"),
         (film, rtol is None, "rtol"),
-        (gas is not None, quantity == "total_conductance", "gas"),
+        (gas is not None, has_gas(quantity), "gas"),
     ):
         if given and not needs:
             raise InputError(
                 f"{names} does not belong to quantity={quantity!r}: leave it out"
             )
-    if quantity == "total_conductance" and gas is None:
+    if has_gas(quantity) and gas is None:
         raise InputError(
-            "total_conductance needs the gas in the gaps, which is missing: Joint(..., gas='air').export(...), "
+            f"{quantity} needs the gas in the gaps, which is missing: Joint(..., gas='air').export(...), "
             "or `mbma export TARGET --joint FILE`; without gas it is quantity='solid_conductance'"
         )
     theory = "calibrated" if film and theory is None else theory
@@ -226,15 +240,11 @@ def describe_law(
         said.extend(exported.of_gas(gas, unit, end, included=True))
         assert conductivity is not None
         facts = facts | {"conductivity": (float(conductivity), str(conductivity_unit))}
-    elif quantity == "tangential_stiffness":
+    elif sticks:
         number_of = 1.0 if callable(kappa) else kappa
         scale, unit = exported.slope(quantity, kappa=number_of)
-    elif quantity != "pressure":
-        unit = (
-            exported.length
-            if quantity == "hydraulic_aperture"
-            else f"{exported.length}^3"
-        )
+    else:
+        unit = in_files()[quantity].unit_in(exported.units)
     if friction is not None:
         of_friction, *more_said = _friction(
             exported, friction, kappa, friction_pressure, pressures
@@ -242,7 +252,7 @@ def describe_law(
         facts |= of_friction
         said.extend(more_said)
     choose = functools.partial(choose, most_rows=most_rows)
-    ratio = kappa if quantity == "tangential_stiffness" and callable(kappa) else None
+    ratio = kappa if sticks and callable(kappa) else None
     return _table(
         exported,
         quantity,
@@ -280,13 +290,13 @@ def _curve(
     if quantity == "pressure":
         return c, pressure
     rises = np.append(True, np.diff(pressure) > 0)
-    if quantity in FLOWS:
+    if power := power_of_flow(quantity):
         flow = np.asarray(exported.leakage(separation=d))
         # the first row that is blocked is the last; what is not known has no row
         open_ = rises & np.append(True, flow[:-1] > 0) & ~np.isnan(flow)
         if not open_.any():
             raise InputError(f"{quantity} of this yielded contact is not known anywhere")
-        return pressure[open_], flow[open_] ** FLOWS[quantity]
+        return pressure[open_], flow[open_] ** power
     if exported.hardness < np.inf:
         stiffness[1:] = exported.answer(law.h_max - c[1:]).unloading_stiffness
     values = scale * stiffness
@@ -294,6 +304,13 @@ def _curve(
         # the gaps of first contact conduct, too
         values += gas.conductance(exported.answer(law.h_max - c))
     return pressure[rises], values[rises]
+
+
+def power_of_flow(quantity: str) -> float:
+    """The power of the flow coefficient that rows are; 0 of others."""
+    if follows(quantity) != flow_coefficient.name:
+        return 0.0
+    return in_files()[quantity].dimension.length / flow_coefficient.dimension.length
 
 
 def _friction(
@@ -355,20 +372,18 @@ def _table(
 ) -> LawTable:
     """Rows up to an overclosure, whose error bound applies above the pressure `least`, or above `FLOOR`."""
     law = exported.law
-    length = exported.length
-    stress = exported.stress
     fine_x, fine_y = _curve(exported, quantity, end, scale, gas)
-    x_name, x_unit = (
-        ("overclosure", length) if quantity == "pressure" else ("pressure", stress)
-    )
+    x_name = against(quantity)
+    x_unit = unit_of(x_name, law.units)
+    power = power_of_flow(quantity)
     y_name = quantity if exported.force is None else "force"
     floor = FLOOR * float(fine_y[-1])
-    if quantity in FLOWS:
+    if power:
         floor = float(fine_y[-1])
         if law.at_pressure(fine_x[-1]).area > LARGEST_AREA:
             floor = (
                 float(exported.leakage(separation=law.separation(area=LARGEST_AREA)))
-                ** FLOWS[quantity]
+                ** power
             )
         # without so much contact gaps may close for want of a mean separation
         floor = (floor or FLOOR * float(fine_y[0])) * (1 - 1e-9)
@@ -376,7 +391,7 @@ def _table(
         floor = (
             least if quantity == "pressure" else float(np.interp(least, fine_x, fine_y))
         )
-    if slope := quantity in (*CONDUCTANCES, "tangential_stiffness"):
+    if slope := follows(quantity) == unloading_stiffness.name:
         # below the smallest pressure of interest there is only the row of zero pressure
         used = np.append(True, fine_y[1:] > floor * (1 - 1e-9))
         fine_x = fine_x[used]
@@ -391,7 +406,7 @@ def _table(
         if law.turning_point is None
         else "where the force of this surface has its maximum"
     )
-    if quantity in FLOWS and exported.leakage.blocked_at >= law.h_max - end:
+    if power and exported.leakage.blocked_at >= law.h_max - end:
         why = "where contact blocks the gaps"
         if exported.unknown_from == -np.inf:
             why = "where the elastic contact blocks the gaps: beyond, the flow of the yielded one is not known"
@@ -399,7 +414,7 @@ def _table(
         why = "the largest asked for"
     more: dict[str, tuple[FloatArray, str]] = {}
     of_others: list[str] = []
-    if quantity == "hydraulic_aperture":
+    if quantity == hydraulic_aperture.name:
         more, of_others = _of_aperture(exported, x, fine_x, fine_y, floor)
     columns = {y_name: (y, y_unit), **more}
     named = ", ".join(f"{name} [{unit}]" for name, (_, unit) in columns.items())
@@ -415,7 +430,7 @@ def _table(
         ),
         *said,
         end=end,
-        leakage=quantity in FLOWS,
+        leakage=bool(power),
     )
     return LawTable(
         x,
@@ -451,7 +466,7 @@ def _rows_of_registry(
         first = max(int(np.searchsorted(pressure, least, side="right")) - 1, 0)
         c, pressure = c[first:], pressure[first:]
     pressed = law.at(separation=law.h_max - 2 * c)
-    declared = registry.get(quantity)
+    declared = in_files()[quantity]
     values = np.asarray(pressed.quantity(quantity))
     if values.dtype == bool:
         raise InputError(f"{quantity} is true or false, and has no rows")

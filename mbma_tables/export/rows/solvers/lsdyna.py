@@ -8,24 +8,24 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.export.law_table import Curve, LawTable, titled
-from mbma_tables.export.targets import CONDUCTANCES, STAY_WITHIN_ROWS, RowFormat
+from mbma_tables.export.targets import STAY_WITHIN_ROWS, RowFormat
 from mbma_tables.export.text import comment, number
 
 # columns of a field
 WIDTH = 20
 # of a number in so many columns
 RTOL = 5e-13
-TAKES = ("pressure", *CONDUCTANCES, "tangential_stiffness", "leakage")
 
 
-def _curve(law: LawTable, curve: int = 1) -> str:
+def _curve(rows: FloatArray, column: FloatArray, curve: int = 1) -> str:
     """*DEFINE_CURVE with its number, scales of 1, offsets of 0, and two fields a row."""
     scale = f"{1.0:10.1f}"
     offset = f"{0.0:10.1f}"
     settings = f"{curve:10d}{0:10d}{scale}{scale}{offset}{offset}{0:10d}"
     lines = ["*DEFINE_CURVE", settings]
-    for x, y in zip(law.x, law.y, strict=True):
+    for x, y in zip(rows, column, strict=True):
         lines.append(_field(x) + _field(y))
     return "\n".join(lines) + "\n"
 
@@ -34,13 +34,23 @@ def _field(value: float) -> str:
     return number(value, width=WIDTH).rjust(WIDTH)
 
 
+def _of_one(law: LawTable) -> str:
+    """A curve, whose title is in the header, or one for each column."""
+    return _curves([law]) if law.more else _curve(law.x, law.y)
+
+
 def _curves(laws: Sequence[LawTable]) -> str:
     """Curves 1, 2, ..., below a list of what they are."""
     titles = ""
     curves = ""
-    for curve, law in enumerate(laws, 1):
-        titles += comment([f"curve {curve}: {law.title}"], "$")
-        curves += _curve(law, curve)
+    number_of_curve = 0
+    for law in laws:
+        (abscissa, (rows, unit)), *columns = law.columns.items()
+        for name, (column, of_column) in columns:
+            number_of_curve += 1
+            title = f"{name} [{of_column}] against {abscissa} [{unit}]"
+            titles += comment([f"curve {number_of_curve}: {title}"], "$")
+            curves += _curve(rows, column, number_of_curve)
     return titles + curves
 
 
@@ -61,11 +71,11 @@ def _read(text: str) -> list[Curve]:
 lsdyna = RowFormat(
     name="lsdyna",
     program="LS-DYNA",
-    output="`*DEFINE_CURVE`, to be included in a deck",
+    output="`*DEFINE_CURVE` for each column, to be included in a deck",
     tested="parsed by ansys-dyna-core 0.12.1",
     read=_read,
     mark="$",
-    body=dict.fromkeys(TAKES, _curve),
+    of_any=_of_one,
     beyond=STAY_WITHIN_ROWS,
     several=_curves,
 )
