@@ -1,6 +1,7 @@
 """Times of tables, totals, laws, the calibrated law, exported C, scenes and a fresh process, each beside a peer.
 
-``python -m benchmarks`` prints them, ``--write`` puts them into docs/lookup.md too. One
+``python -m benchmarks`` prints them, ``--write`` puts them into docs/lookup.md too, and
+``python -m benchmarks joints`` those of joints and tables of designs. One
 core; every ratio is of two processor times taken in turn, the median over the rounds, so
 that what else the machine does falls on both. docs/cost.md has error against time of every
 island model.
@@ -15,9 +16,11 @@ import dataclasses
 import functools
 import importlib.util
 import itertools
+import pathlib
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 import timeit
 from collections.abc import Callable
@@ -32,7 +35,7 @@ from benchmarks.exports import exported
 from benchmarks.functions import functions
 from benchmarks.kernels import BEFORE, held_out, measured
 from benchmarks.maps import maps
-from benchmarks.rows import LINES, microseconds, report, rounds, times_faster
+from benchmarks.rows import LINES, Line, microseconds, report, rounds, times_faster
 from benchmarks.scenes import scenes
 from benchmarks.surrogates import surrogates
 from generate import page
@@ -48,6 +51,7 @@ from mbma_tables import (
     open_table,
 )
 from mbma_tables.common.files import shipped_file
+from mbma_tables.design import batch as designs
 from mbma_tables.theories import Calibrated, Mbma
 from mbma_tables.theories.calibrated.formulas import Spectrum, SpectrumLaw
 
@@ -61,6 +65,7 @@ MANY_GAPS = 1_000_000
 CALLS = 10_000  # of one number: a loop of them, not its first ones
 JOINTS = 10_000
 MILLION = 1_000_000
+ROWS = 100_000  # of a table of designs
 METALS = ("steel 4140 hard", "aluminium 6061 hard")
 HARD = Bodies(hardness=0.1)
 BAND_NUMBERS = ("hurst", "longest", "shortest")
@@ -389,6 +394,69 @@ def _table_of_one(shortest: float, changed: float) -> None:
     joint.table(["1 MPa", "10 MPa", "50 MPa"])
 
 
+def _table_of_designs(folder: pathlib.Path, rng: np.random.Generator) -> pathlib.Path:
+    """A CSV file of faces of five numbers, of a modulus and a hardness, for `mbma batch`."""
+    numbers = {
+        "part_a.hurst": rng.uniform(0.6, 0.95, ROWS),
+        "part_a.q0 [1/um]": np.full(ROWS, 0.01),
+        "part_a.q1 [1/um]": rng.uniform(0.3, 3.0, ROWS),
+        "part_a.h_rms [um]": np.full(ROWS, 1.0),
+        "part_a.h_max [um]": np.full(ROWS, 4.0),
+        "pressure [MPa]": rng.uniform(1.0, 50.0, ROWS),
+    }
+    path = folder / "designs.csv"
+    columns = np.stack(list(numbers.values()), axis=1)
+    header = ",".join(numbers)
+    np.savetxt(path, columns, "%.6g", ",", header=header, comments="")
+    return path
+
+
+def rows_of_designs(rng: np.random.Generator) -> None:
+    """`mbma batch`, every quantity, on one process and on two."""
+    common = {"bodies": {"E_star": "115 GPa", "hardness": "1.5 GPa"}}
+    a_million = MILLION / ROWS
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        path = _table_of_designs(folder, rng)
+        out = folder / "answers.csv"
+        alone = rounds({"one": lambda: designs.batch(path, out, common=common)}, 3)["one"]
+        spent = []
+        for _ in range(3):
+            start = time.perf_counter()
+            designs.batch(path, out, common=common, workers=2)
+            spent.append(time.perf_counter() - start)
+    report(
+        "a million rows of mbma batch, every quantity, of one core",
+        a_million * statistics.median(alone),
+        "s",
+        at_most=20,
+    )
+    # the least of the rounds, since what else the machine does is in it
+    report("the same on two processes, elapsed", a_million * min(spent), "s", at_most=10)
+
+
+def unknown_numbers() -> None:
+    """A joint of which five numbers are ranges."""
+    face = {
+        "Ra": "0.8 um +- 0.1 um",
+        "hurst": "0.7..0.9",
+        "longest": "0.4..0.8 mm",
+        "shortest": "8 um",
+    }
+    bodies = {"E_star": "58 GPa", "hardness": "0.95..1.3 GPa"}
+    joint = Joint(face, bodies=bodies, nominal_area="2..4 cm^2")
+    seeds = itertools.count()
+    taken = rounds(
+        {"one": lambda: joint.uncertainty("10 MPa", draws=2000, seed=next(seeds))}, 5
+    )
+    report(
+        "uncertainty of a joint with five ranges, 2,000 draws",
+        statistics.median(taken["one"]),
+        "s",
+        at_most=1,
+    )
+
+
 def joints(rng: np.random.Generator) -> None:
     """Two parts of metal, surfaces beyond the table, and a million candidates."""
     faces = _parts(rng, JOINTS)
@@ -460,6 +528,8 @@ def joints(rng: np.random.Generator) -> None:
         "s",
         at_most=20,
     )
+    rows_of_designs(rng)
+    unknown_numbers()
 
 
 FIRST = {
@@ -528,7 +598,6 @@ def main(context: click.Context, write: bool) -> None:
         totals,
         laws,
         calibrated,
-        joints,
         maps,
         exported,
         scenes,
@@ -536,14 +605,34 @@ def main(context: click.Context, write: bool) -> None:
         section(rng)
     click.echo(f"\nload average {os.getloadavg()[0]:.2f} at the end")
     if write:
-        marks = {None: "", True: "met", False: "missed"}
-        rows = [
-            [x.name.strip(), f"{x.value:.3g} {x.unit}".strip(), x.wanted, marks[x.met]]
-            for x in LINES
-        ]
-        measured = page.table("what | measured | wanted | ", rows)
-        machine = f"{os.cpu_count()} cores, load average {load[0]:.1f}."
-        page.write("lookup", {"times": f"{machine}\n\n{measured}"}, {}, ROOT)
+        _put("times", LINES, load[0])
+
+
+def _put(block: str, lines: list[Line], load: float) -> None:
+    """Write lines into a block of docs/lookup.md, whose other blocks stay as they are."""
+    marks = {None: "", True: "met", False: "missed"}
+    rows = [
+        [x.name.strip(), f"{x.value:.3g} {x.unit}".strip(), x.wanted, marks[x.met]]
+        for x in lines
+    ]
+    measured = page.table("what | measured | wanted | ", rows)
+    machine = f"{os.cpu_count()} cores, load average {load:.1f}."
+    text = (ROOT / "docs" / "lookup.md").read_text(encoding="utf-8")
+    parts = {
+        match[2]: match[0].removeprefix(match[1]).removesuffix(match[3]).strip("\n")
+        for match in page.MARKED.finditer(text)
+    }
+    page.write("lookup", parts | {block: f"{machine}\n\n{measured}"}, {}, ROOT)
+
+
+@main.command("joints")
+@click.option("--write", is_flag=True, help="Put the table into docs/lookup.md.")
+def joints_command(write: bool) -> None:
+    """Time joints, batches of them and tables of designs alone."""
+    load = os.getloadavg()[0]
+    joints(np.random.default_rng(SEED))
+    if write:
+        _put("joints", LINES, load)
 
 
 main.add_command(functions)
