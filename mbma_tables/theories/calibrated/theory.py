@@ -168,6 +168,8 @@ class Batch:
             yield some, self.contacts if at_gaps else self.separations, owner[some]
         if not self.whole:
             some = np.flatnonzero(~covered & asked)
+            # one surface after the other, each of which the loop prepares once
+            some = some[np.argsort(owner[some], kind="stable")]
             loop = self.spectra.contacts if at_gaps else self.spectra.separations
             yield some, loop, self.number[owner[some]]
 
