@@ -44,6 +44,7 @@ BLOCK = 1 << 14  # points between two checks for Ctrl-C
 STEPS = 80  # of an inverse
 NUMBERS = ("axis_numbers", "output_numbers")
 ROUNDING = 4e-15
+LAST_STEP = 1e-9  # of an inverse, over the width of the cell
 SOLVED = 1e-15  # relative, of an inverse; of a logarithm absolute where it is small
 
 
@@ -64,6 +65,10 @@ class FunctionAxis:
         """The coordinate on which boxes are halved."""
         shifted = np.asarray(x, dtype=float)
         return np.log(shifted + self.offset) if self.transform == "log" else shifted
+
+    def by_grid(self, x: FloatArray) -> FloatArray:
+        """The derivative of the argument by the coordinate."""
+        return np.asarray(x + self.offset if self.transform == "log" else np.ones_like(x))
 
     def from_grid(self, t: Any) -> Any:
         """Inverse of `to_grid`, within the range."""
@@ -175,31 +180,58 @@ class FunctionTable:
             )
         return self.members
 
-    def _of_members(self, chosen: slice, exact: FloatArray) -> dict[str, Any]:
-        """The arrays of some of the stored members, each with all outputs."""
-        members = len(self._require_members().stored)
-        outputs = len(self.outputs)
-        starts = self.arrays["starts"].astype(int) * members
-        blocks = np.split(self.arrays["member_coefficients"], starts[1:])
-        count = len(range(members)[chosen])
-        parts = [block.reshape(members, -1)[chosen].ravel() for block in blocks]
-        errors = self.arrays["member_errors"].reshape(-1, members, outputs)[:, chosen]
+    def _some(
+        self,
+        coefficients: FloatArray,
+        errors: FloatArray,
+        exact: FloatArray,
+        which: slice,
+    ) -> dict[str, Any]:
+        """The arrays of a table of some of the outputs that coefficients and bounds are of."""
+        width, count = errors.shape[1], len(range(errors.shape[1])[which])
+        starts = self.arrays["starts"].astype(int) // len(self.outputs)
+        blocks = np.split(coefficients, starts[1:] * width)
+        parts = [block.reshape(width, -1)[which].ravel() for block in blocks]
         return {
             **{name: self.arrays[name] for name in ("branches", "middles", "terms")},
-            "starts": self.arrays["starts"] * count,
+            "starts": starts * count,
             "coefficients": np.concatenate(parts),
-            "errors": errors.reshape(len(errors), -1),
+            "errors": errors[:, which],
             "conformance_x": self.arrays["conformance_x"],
-            "conformance_exact": exact,
+            "conformance_exact": exact[:, which],
         }
+
+    def _of_members(self, which: slice) -> dict[str, Any]:
+        """The arrays of some of the outputs of the stored members."""
+        arrays = self.arrays
+        return self._some(
+            arrays["member_coefficients"],
+            arrays["member_errors"],
+            arrays["member_exact"],
+            which,
+        )
 
     @shared_property
     def _members_table(self) -> FunctionTable:
         """The stored members as outputs of one table."""
         outputs = self.outputs * len(self._require_members().stored)
-        arrays = self._of_members(slice(None), self.arrays["member_exact"])
         plain = {n: v for n, v in self.attributes.items() if n != "members"}
-        return FunctionTable(self.axes, outputs, arrays, plain)
+        return FunctionTable(self.axes, outputs, self._of_members(slice(None)), plain)
+
+    @shared_property
+    def _alone(self) -> tuple[FunctionTable, ...]:
+        """Each output as a table of its own."""
+        arrays = self.arrays
+        found = []
+        for k, output in enumerate(self.outputs):
+            own = self._some(
+                arrays["coefficients"],
+                arrays["errors"],
+                arrays["conformance_exact"],
+                slice(k, k + 1),
+            )
+            found.append(FunctionTable(self.axes, (output,), own, {}))
+        return tuple(found)
 
     def member(self, name: str) -> FunctionTable:
         """A member as a table of its own.
@@ -229,9 +261,9 @@ class FunctionTable:
         attributes["certificate"] = json.dumps(certificate | {"largest_error": largest})
         outputs = len(self.outputs)
         columns = slice(number * outputs, (number + 1) * outputs)
-        exact = self.arrays["member_exact"][:, columns]
-        arrays = self._of_members(slice(number, number + 1), exact)
-        return FunctionTable(self.axes, self.outputs, arrays, attributes)
+        return FunctionTable(
+            self.axes, self.outputs, self._of_members(columns), attributes
+        )
 
     def _spread(
         self,
@@ -506,8 +538,8 @@ class FunctionTable:
         return np.asarray(found)
 
     @shared_property
-    def _directions(self) -> NDArray[np.int64]:
-        """By output and axis 1 or -1, the sign of all slopes, or 0 where both signs occur."""
+    def _samples(self) -> tuple[FloatArray, FloatArray]:
+        """Values and slopes by coordinates of the axes, at some points of every cell."""
         low, high = self._ends
         places = 0.5 * (1 + tests(len(self.axes)))
         t = low[:, None] + places * (high - low)[:, None]
@@ -515,10 +547,29 @@ class FunctionTable:
             [axis.from_grid(t[..., a]).ravel() for a, axis in enumerate(self.axes)],
             axis=-1,
         )
-        _, slopes, _, _ = self._answers(np.ascontiguousarray(points), True)
+        values, slopes, _, _ = self._answers(np.ascontiguousarray(points), True)
+        for a, axis in enumerate(self.axes):
+            slopes[:, :, a] *= axis.by_grid(points[:, a])[:, None]
+        return values, slopes
+
+    @shared_property
+    def _directions(self) -> NDArray[np.int64]:
+        """By output and axis 1 or -1, the sign of all slopes, or 0 where both signs occur."""
+        _, slopes = self._samples
         rises = np.nanmin(slopes, axis=0) > 0
         falls = np.nanmax(slopes, axis=0) < 0
         return np.asarray(rises.astype(int) - falls.astype(int))
+
+    @shared_property
+    def _logarithms(self) -> NDArray[np.bool_]:
+        """By output and axis, whether an inverse is that of the logarithm, which is closer to a line."""
+        values, slopes = self._samples
+        positive = np.nanmin(values, axis=0) > 0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            curved = np.nanstd(slopes, axis=0) / np.abs(np.nanmean(slopes, axis=0))
+            of_log = slopes / values[:, :, None]
+            less = np.nanstd(of_log, axis=0) / np.abs(np.nanmean(of_log, axis=0))
+        return np.asarray(positive[:, None] & (less < curved))
 
     def has_inverse(self, output: str, axis: str) -> bool:
         """Whether an output increases, or decreases, everywhere along an axis."""
@@ -571,18 +622,25 @@ class FunctionTable:
         whole = np.broadcast_shapes(shape, wanted.shape)
         index = np.broadcast_to(np.arange(len(x)).reshape(shape), whole).ravel()
         target = np.broadcast_to(wanted, whole).ravel()
-        found, error = self._solved(x[index], k, a, direction, target)
+        is_log = bool(self._logarithms[k, a])
+        found, error = self._alone[k]._solved(x, index, a, direction, target, is_log)
         return found.reshape(whole)[()], error.reshape(whole)[()]
 
     def _solved(
-        self, x: FloatArray, k: int, a: int, direction: int, target: FloatArray
+        self,
+        x: FloatArray,
+        index: NDArray[np.int64],
+        a: int,
+        direction: int,
+        target: FloatArray,
+        is_log: bool,
     ) -> tuple[FloatArray, FloatArray]:
-        """Newton's method along axis `a`, within ends between which output `k` reaches `target`."""
-        axis, output = self.axes[a], self.outputs[k]
+        """Newton's method along axis `a` at some of the points `x`, within ends between which the output reaches `target`."""
+        axis, output = self.axes[a], self.outputs[0]
         ends = []
         for end in (axis.low, axis.high)[::direction]:
             x[:, a] = end
-            ends.append(self._answers(x, False)[0][:, k])
+            ends.append(self._answers(x, False)[0][index, 0])
         good = (target >= ends[0]) & (target <= ends[1])
         limits = f"within {np.nanmin(ends[0]):g} to {np.nanmax(ends[1]):g}"
         require(
@@ -595,24 +653,26 @@ class FunctionTable:
             np.full(target.size, float(axis.to_grid(e))) for e in (axis.low, axis.high)
         )
         span = high[0] - low[0]
-        # an exponential is solved by its logarithm, which is closer to a line
-        is_log = output.transform == "log"
         goal, *stored = (np.log(v) if is_log else v for v in (target, *ends))
         with np.errstate(divide="ignore", invalid="ignore"):
             part = (goal - stored[0]) / (stored[1] - stored[0])
         part = np.nan_to_num(part, nan=0.5)
         t = low + (part if direction > 0 else 1 - part) * span
+        x = x[index]
+        error = np.empty(target.size)
         active = np.arange(target.size)
         for _ in range(STEPS):
             points = x[active]
             points[:, a] = axis.from_grid(t[active])
-            values, slopes, _, _ = self._answers(np.ascontiguousarray(points), True)
-            value, by_t = values[:, k], slopes[:, k, a]
+            values, slopes, stated, cells = self._answers(points, True)
+            value, by_x = values[:, 0], slopes[:, 0, a]
+            by_t = by_x * axis.by_grid(points[:, a])
+            bound = self._absolute(values, stated)[:, 0]
+            with np.errstate(divide="ignore"):
+                error[active] = bound / np.abs(by_x)
             if is_log:
                 value, by_t = np.log(value), by_t / value
             excess = direction * (value - goal[active])
-            if axis.transform == "log":
-                by_t = by_t * (points[:, a] + axis.offset)
             above = excess > 0
             high[active[above]] = t[active[above]]
             low[active[~above]] = t[active[~above]]
@@ -623,20 +683,25 @@ class FunctionTable:
             # what rounding leaves of a sum of this size
             near = np.abs(excess) <= SOLVED * np.maximum(np.abs(goal[active]), is_log)
             moved = np.abs(step - t[active])
-            t[active] = np.where(near, t[active], step)
+            t[active] = np.where(near & ~inside, t[active], step)
             done = near | (moved <= 4e-16 * np.maximum(span, np.abs(t[active])))
+            # on one polynomial, the error that follows such a step is its square
+            is_last = inside & (moved <= LAST_STEP * self._widths[cells, a])
+            done |= is_last & self._is_in(cells, a, step)
             active = active[~done]
             if not active.size:
                 break
         else:
             raise ConvergenceError(f"the inverse along {axis.name} did not converge")
-        x[:, a] = axis.from_grid(t)
-        values, slopes, errors, _ = self._answers(x, True)
-        slope = np.abs(slopes[:, k, a])
-        bound = self._absolute(values, errors)[:, k]
-        with np.errstate(divide="ignore"):
-            error = bound / slope + ROUNDING * np.abs(x[:, a])
-        return x[:, a].copy(), error
+        found = axis.from_grid(t)
+        return found, error + ROUNDING * np.abs(found)
+
+    def _is_in(
+        self, cells: NDArray[np.int64], a: int, t: FloatArray
+    ) -> NDArray[np.bool_]:
+        """Whether coordinates on an axis lie in these cells."""
+        low, high = self._ends
+        return np.asarray((t >= low[cells, a]) & (t <= high[cells, a]))
 
     def replayed(self) -> tuple[int, float]:
         """Held-out points that the file keeps, and the largest error there over the bound."""

@@ -6,6 +6,7 @@ import pathlib
 import pickle
 import subprocess
 import sys
+import time
 
 import mpmath
 import numpy as np
@@ -142,6 +143,29 @@ def test_an_inverse_is_within_its_bound(smooth):
     one, _ = smooth.inverse("x", u=float(u[0]), y=float(y[0]))
     assert np.ndim(one) == 0
     assert abs(one / x[0] - 1) < 1e-7
+
+
+def test_an_inverse_takes_few_lookups(smooth, monkeypatch):
+    """Two at the ends, and less than four steps on average, also of a power whose value is not stored by its logarithm."""
+    draws = np.random.default_rng(8)
+    x, y = np.exp(draws.uniform(np.log(0.02), np.log(9), 2000)), draws.random(2000)
+    u = tabulated.smooth(x, y)[0]
+    smooth.inverse("x", u=u, y=y)  # what is found once for a table
+    asked = []
+    answers = type(smooth)._answers
+
+    def counted(table, points, slopes):
+        asked.append(len(points))
+        return answers(table, points, slopes)
+
+    monkeypatch.setattr(type(smooth), "_answers", counted)
+    found, _ = smooth.inverse("x", u=u, y=y)
+    assert sum(asked) <= 6 * x.size
+    np.testing.assert_allclose(smooth.lookup(found, y)["u"], u, rtol=1e-14)
+    # ends are asked once for all values beside them
+    asked.clear()
+    smooth.inverse("x", u=tabulated.smooth(x, 0.5)[0], y=0.5)
+    assert asked[:2] == [1, 1]
 
 
 def test_derivatives_and_inverses_beside_thirty_digits(tmp_path):
@@ -646,3 +670,46 @@ def test_points_of_a_file_are_replayed(tmp_path):
     found = CliRunner().invoke(main, ["tables", "verify", str(tmp_path / "off.nc")])
     assert found.exit_code != 0
     assert "times its bound" in found.output
+
+
+def test_the_text_for_slurm_submits_jobs_with_workers_of_its_scheduler(
+    tmp_path, monkeypatch, capsys
+):
+    """The page's program with a stand-in for `sbatch` that keeps what it is given; no SLURM is at hand."""
+    pytest.importorskip("dask_jobqueue")
+    page = pathlib.Path(__file__).parents[2] / "docs" / "functions.md"
+    block = next(
+        part
+        for part in page.read_text(encoding="utf-8").split("```text\n")
+        if part.startswith("from dask_jobqueue")
+    ).partition("```")[0]
+    stands_in = {
+        "sbatch": 'cp "$1" "$(mktemp "$0.XXXXXX")"; echo "job $$"',
+        "scancel": "",
+    }
+    for name, line in stands_in.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{line}\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    space = {}
+    exec(block, space)
+    try:
+        address = space["cluster"].scheduler_address
+        assert address in capsys.readouterr().out
+        deadline = time.monotonic() + 30
+        while len(jobs := [*tmp_path.glob("sbatch.*")]) < 20:
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        for job in jobs:
+            text = job.read_text()
+            for line in (
+                "--cpus-per-task=8",
+                "--mem=15G",
+                "-t 04:00:00",
+                "--partition=cpu",
+            ):
+                assert f"#SBATCH {line}\n" in text
+            assert f"dask_worker {address} " in text
+            subprocess.run(["bash", "-n", str(job)], check=True)
+    finally:
+        space["cluster"].close()
