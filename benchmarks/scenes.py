@@ -1,5 +1,6 @@
 """Random scenes: what they promised beside what they did, in error and in time."""
 
+import itertools
 import time
 from typing import Any
 
@@ -8,8 +9,10 @@ import numpy as np
 from scipy.integrate import quad_vec
 
 from benchmarks.rows import report
+from generate.timing import measure
 from mbma_tables import Bodies, InputError, Scene, Surface, contact
-from mbma_tables.theories import Mbma
+from mbma_tables.design.scenes.plan import shipped_costs
+from mbma_tables.theories import THEORIES, Mbma
 
 SCENES = 200
 GAPS = 4
@@ -108,3 +111,49 @@ def scenes(rng: np.random.Generator) -> None:
         float(np.mean((ratio > 0.5) & (ratio < 2))),
         "",
     )
+
+
+SIZES = (10, 1000, 30_000)
+ASKED = (["area"], ["area", "stiffness", "solid_conductance"], ["energy"])
+
+
+def over_plan(
+    by: str, size: int, generator: np.random.Generator, **options: Any
+) -> float:
+    """Time of a scene of many loads over its plan's, both over the fixed work of this moment."""
+    pressures = np.geomspace(1e-4, 2e-2, size)
+    values = pressures if by == "pressure" else np.linspace(0.5, 3.0, size)
+
+    def scene() -> Scene:
+        q1 = 1.0 + 1e-6 * generator.random()  # which no theory has seen
+        surface = Surface(0.8, 0.01, q1, 1.0, 3.6, unit="um")
+        given: dict[str, Any] = {by: values, **options}
+        return Scene(surface, rtol=1e-4, **given)
+
+    cost, _ = measure(lambda: scene().run())
+    making, _ = measure(scene)
+    return (cost - making) * shipped_costs().seconds / scene().plan().seconds
+
+
+def sizes(generator: np.random.Generator) -> None:
+    """Scenes of few and of many loads by every theory: `python -m benchmarks.scenes`."""
+    ratios: dict[int, list[float]] = {size: [] for size in SIZES}
+    for theory, hardness, by, quantities in itertools.product(
+        THEORIES, (None, "2 GPa"), ("pressure", "mean_separation"), ASKED
+    ):
+        bodies = Bodies("100 GPa", hardness=hardness, conductivity="45 W/(m K)")
+        options = {"bodies": bodies, "theory": theory, "quantities": quantities}
+        found = [over_plan(by, size, generator, **options) for size in SIZES]
+        for size, ratio in zip(SIZES, found, strict=True):
+            ratios[size].append(ratio)
+        texts = "".join(f"{ratio:8.2f}" for ratio in found)
+        kind = hardness or "elastic"
+        click.echo(f"{theory:22}{kind:9}{by:17}{'+'.join(quantities):40}{texts}")
+    for size, of_size in ratios.items():
+        within = np.mean([0.5 < ratio < 2 for ratio in of_size])
+        report(f"{size} loads: within a factor 2 of the plan's time", float(within), "")
+        report(f"{size} loads: median over it", float(np.median(of_size)), "x")
+
+
+if __name__ == "__main__":
+    sizes(np.random.default_rng(1))

@@ -282,3 +282,14 @@ def test_where_contact_begins():
     assert np.isnan(found.slopes["h_max"]["area"][2:]).all()
     apart = sensitivity(surface, "110 GPa", separation="2 um", theory="mbma")
     assert "zero, which has no logarithm: pressure, area" in str(apart)
+
+
+@pytest.mark.slow
+def test_random_quantities_by_random_numbers():
+    """`python -m benchmarks.derivative_errors` has 500 of them, in docs/derivatives.md."""
+    from benchmarks.derivative_errors import outcomes
+
+    made = outcomes(60, seed=7)
+    smooth = [one for one in made if one.smooth]
+    assert len(smooth) >= 50
+    assert [one for one in smooth if not one.error <= ERROR] == []
