@@ -30,6 +30,7 @@ COMMANDS = {
     "gaps": "generate.gaps",
     "gas_flow": "generate.gas_flow",
     "machined": "generate.machined.campaign",
+    "profiles": "generate.machined.profiles",
     "quantities": "generate.quantities",
     "raw_maps": "generate.machined.raw_maps",
     "rough_spheres": "generate.rough_spheres",

@@ -2,8 +2,12 @@
 
 The simulations are the boundary elements of docs/data.md that no fit saw. Each kind has its
 own share of errors within two standard deviations; the least is that of docs/fidelity.md,
-docs/yield.md, docs/leakage.md and docs/machined.md.
+docs/yield.md, docs/leakage.md, docs/machined.md and docs/maps.md.
 """
+
+import csv
+import gzip
+import pathlib
 
 import numpy as np
 import pytest
@@ -11,6 +15,7 @@ import pytest
 from mbma_tables import Bodies, Joint, Surface, contact
 from mbma_tables.theories.dataset import boundary_elements
 
+TRACES = pathlib.Path(__file__).parents[1] / "docs/data/profiles.csv.gz"
 HELD_OUT = ("held_out_surface", "held_out_spectrum")
 # q0 h_rms of the surfaces here: slopes are small, as theories and simulations take them
 GRADIENT = 1e-3
@@ -137,11 +142,35 @@ def test_valid_contacts_of_machined_maps(simulations, theory, quantity):
     assert share >= WITHIN_TWO
 
 
-def test_a_trace_is_never_valid():
-    """No coverage was shown on traces of the families of machined surfaces."""
+def test_contacts_from_traces():
+    """Of maps of all families, other ones than the least length was chosen by."""
+    with gzip.open(TRACES, "rt", encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len({row["family"] for row in rows}) > 15
+    valid = [row for row in rows if row["valid"] == "1"]
+    for way, sides in (("one", "32"), ("both", "32")):
+        own = [row for row in valid if (row["way"], row["sides"]) == (way, sides)]
+        columns = [
+            [np.array([float(row[name]) for row in own])] for name in ("error", "scatter")
+        ]
+        share, number = within(*columns)
+        assert number > 300
+        assert share >= WITHIN_TWO
+    # none of worn, patchy, machined or stretched faces looks Gaussian and isotropic
+    assert {row["family"] for row in valid} <= {
+        "self_affine",
+        "plateau",
+        "filtered",
+        "gaussian",
+    }
+
+
+def test_a_trace_without_a_roll_off_is_not_valid():
     heights = np.random.default_rng(1).standard_normal(4096).cumsum()
     trace = Surface.from_profile(
-        1e-3 * (heights - np.linspace(heights[0], heights[-1], 4096)), dx=1.0
+        1e-3 * (heights - np.linspace(heights[0], heights[-1], 4096)),
+        dx=1.0,
+        isotropic=True,
     )
     pressed = contact(trace, area=[0.01, 0.1], theory="calibrated")
     assert not pressed.valid.any()

@@ -42,7 +42,7 @@ from mbma_tables.contacts.quantities.validity import (
 )
 from mbma_tables.contacts.question import GAPS, both_separations
 from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
-from mbma_tables.surfaces.surface import assumptions
+from mbma_tables.surfaces.surface import MeasuredSurface, assumptions
 from mbma_tables.theories.adhesion import with_adhesion
 from mbma_tables.theories.base import Theory, TheoryAnswer
 from mbma_tables.theories.hardness import with_hardness
@@ -523,6 +523,8 @@ class Contact(State, Displayed):
         facts = {"theory": self.theory + of_mbma}
         if self.surface.resolution:
             facts["resolution"] = self.surface.resolution
+        if isinstance(self.surface, MeasuredSurface) and assumptions(self.surface):
+            facts["if"] = "; ".join(assumptions(self.surface))
         for name in ("mean_separation", "pressure", "area"):
             facts[name] = self._shown(name)
         if (

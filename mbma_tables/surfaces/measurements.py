@@ -27,6 +27,15 @@ MAX_HEADER_BYTES = 2**14
 TEXTS = (".csv", ".txt", ".asc", ".xyz")  # names of files that hold numbers as text
 CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")  # bytes that no text has
 INFINITE = re.compile(rb"(?i)(?<![a-z])inf(inity|inite)?(?![a-z])")
+# rows of numbers of a text, with separators of any kind
+ROW = re.compile(rb"[-+\d.,;\seEnNaA]*")
+DIGIT = re.compile(rb"\d")
+SEPARATORS = re.compile(rb"[ \t;,]+")
+HEADS = (b"X;Y;valid", b"Scan Parameters")  # of formats with tables of their own
+LEAST_FILLED = 0.5  # share of a grid that the points of a list with missing rows fill
+SAME_PLACE = 1e-6  # over the extent: smaller differences of coordinates are rounding
+OFF_GRID = 0.1  # sampling steps by which rounded coordinates may be off an even grid
+LONGEST_GAP = 2.5  # over the median step of a line scan
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # of UTF-8
 # blanks that are no space: unbreakable, thin, figure and narrow ones
 BLANKS = re.compile("[\u00a0\u2007\u2009\u202f]")
@@ -89,8 +98,11 @@ def read_measurement(
                 named = _units_of_header(start)
                 stream.seek(0)
                 plain = _without_mark(stream)
+                _refuse_mixed_marks(plain, place.name)
                 with module.open_topography(plain) as reader:
-                    topography = _channel_of(reader, place, dx, dy, unit, channel, named)
+                    topography = _completed(
+                        reader, plain, place, (dx, dy, unit, channel, named)
+                    )
                     if type(reader).__name__ == "AscReader":
                         _refuse_lost_lines(plain, topography, place.name)
                     _refuse_infinite(reader, topography, place.name)
@@ -107,11 +119,122 @@ def read_measurement(
                 else f"{name}: {reason[0]}"
             )
         if suffix in TEXTS:
-            with module.open_topography(io.BytesIO(_plain_matrix(place, why))) as reader:
-                return _channel_of(reader, place, dx, dy, unit, channel, named)
+            plain = io.BytesIO(_plain_matrix(place, why))
+            with module.open_topography(plain) as reader:
+                return _completed(reader, plain, place, (dx, dy, unit, channel, named))
         raise InputError(
             f"SurfaceTopography cannot read {os.fspath(path)!r} as a map: {why}"
         )
+
+
+def _refuse_mixed_marks(stream: Any, name: str) -> None:
+    """Raise an error for a text whose rows of numbers have commas in part.
+
+    A reader takes rows up to the last one that differs as those of a header.
+    """
+    start = stream.read(MAX_HEADER_BYTES)
+    if CONTROL.search(start) or start.startswith(HEADS):
+        stream.seek(0)
+        return
+    with_comma: dict[bool, int] = {}
+    stream.seek(0)
+    for place, line in enumerate(stream, 1):
+        if _is_row(line) and len(line.split()) + line.count(b";") > 1:
+            with_comma.setdefault(b"," in line, place)
+    stream.seek(0)
+    if len(with_comma) > 1:
+        raise InputError(
+            f"{name} has decimal commas in line {with_comma[True]} and none in line "
+            f"{with_comma[False]}: write all numbers with one decimal mark"
+        )
+
+
+def _is_row(line: bytes) -> bool:
+    """Whether a line of a text holds numbers alone."""
+    return bool(ROW.fullmatch(line)) and bool(DIGIT.search(line))
+
+
+def _completed(reader: Any, stream: Any, path: pathlib.Path, options: Any) -> Any:
+    """The channel of an open file, in which missing rows of a list are undefined points."""
+    dx, dy, unit, channel, named = options
+    chosen = reader.default_channel
+    is_list = type(reader).__name__ in ("AscReader", "XYZReader")
+    if is_list:
+        is_grid = chosen.physical_sizes is not None and len(chosen.nb_grid_pts) == 2
+        if is_grid or 3 in chosen.nb_grid_pts:
+            content = _with_missing_rows(stream, path.name)
+            if content is not None:
+                stream = io.BytesIO(content)
+                with library().open_topography(stream) as complete:
+                    return _channel_of(complete, path, dx, dy, unit, channel, named)
+    return _channel_of(reader, path, dx, dy, unit, channel, named)
+
+
+def _with_missing_rows(stream: Any, name: str) -> bytes | None:
+    """A list of x, y and height with a row for each point of its grid; None if it has all.
+
+    None also for a text that is no such list.
+    """
+    stream.seek(0)
+    lines = stream.read().splitlines()
+    stream.seek(0)
+    comments = {line: None for line in lines if line.lstrip().startswith(b"#")}
+    content = [line.strip() for line in lines if line.strip() and line not in comments]
+    first = next((k for k, line in enumerate(content) if _is_row(line)), 0)
+    rows = content[first:]
+    if not all(map(_is_row, rows)):
+        # words among the rows, such as those for infinity, are the reader's to judge
+        return None
+    words = [SEPARATORS.split(row) for row in rows]
+    widths = set(map(len, words))
+    if widths != {len(("x", "y", "height"))}:
+        return None
+    points = numbers_of([b" ".join(row).decode() for row in words], None)
+    places = [_places(points[:, axis], "xy"[axis], name) for axis in (0, 1)]
+    counts = [int(place.max()) + 1 for place, _ in places]
+    flat = places[0][0] * counts[1] + places[1][0]
+    if np.unique(flat).size < flat.size:
+        raise InputError(f"{name} has several heights at one x and y: write one row each")
+    size = counts[0] * counts[1]
+    if flat.size == size:
+        return None
+    if flat.size < LEAST_FILLED * size:
+        raise InputError(
+            f"{name} holds {flat.size} points, {flat.size / size:.0%} of a grid of "
+            f"{counts[0]} x {counts[1]} on which all of them lie: a list of x, y and height "
+            "is read where its points fill a grid of even steps, but for missing rows"
+        )
+    heights = np.full(size, np.nan)
+    heights[flat] = points[:, 2]
+    x, y = (axis[1] for axis in places)
+    filled = io.BytesIO()
+    filled.writelines(comment + b"\n" for comment in comments)
+    columns = [np.repeat(x, counts[1]), np.tile(y, counts[0]), heights]
+    np.savetxt(filled, np.transpose(columns), fmt="%.12g")
+    return filled.getvalue()
+
+
+def _places(values: Any, axis: str, name: str) -> tuple[Any, Any]:
+    """Number of each coordinate on a grid of even steps, and the coordinates of the grid."""
+    if not np.isfinite(values).all():
+        raise InputError(f"{name} has points whose {axis} is no number")
+    first = float(values.min())
+    span = float(values.max()) - first
+    gaps = np.diff(np.unique(values))
+    gaps = gaps[gaps > SAME_PLACE * span]
+    if not gaps.size:
+        raise InputError(f"all points of {name} have one {axis}")
+    count = round(span / float(gaps.min()))
+    place = (values - first) / (span / count)
+    number = np.rint(place).astype(int)
+    off = np.abs(place - number)
+    if off.max() > OFF_GRID:
+        row = int(off.argmax())
+        raise InputError(
+            f"{name}: {axis} = {values[row]:g} of point {row + 1} is {off.max():.2f} steps "
+            f"off a grid of even steps of {span / count:g}"
+        )
+    return number, first + span / count * np.arange(count + 1)
 
 
 def _without_mark(stream: Any) -> Any:
@@ -391,6 +514,7 @@ def grid_of(
         )
     if not getattr(source, "is_uniform", True):
         # its points are nearly as dense where they are not even
+        _refuse_gaps(source)
         try:
             source = source.to_uniform(nb_points=source.nb_grid_pts[0])
         except RuntimeError:
@@ -420,6 +544,20 @@ def grid_of(
         for size, count in zip(extent, np.shape(grid), strict=True)
     )
     return grid, sampling, bool(whole), getattr(source, "unit", None)
+
+
+def _refuse_gaps(scan: Any) -> None:
+    """Raise an error for a line scan with a gap, over which it would be interpolated."""
+    x = np.ma.getdata(scan.positions())
+    steps = np.diff(x)
+    # what does not rise is refused later
+    if (steps > 0).all() and steps.max() > LONGEST_GAP * np.median(steps):
+        place = int(steps.argmax())
+        raise InputError(
+            f"the line scan has no points between x = {x[place]:g} and {x[place + 1]:g}, "
+            f"{steps[place] / np.median(steps):.3g} times its usual step: give missing "
+            "points rows with NaN, or give its parts as traces, Surface.from_profile([...])"
+        )
 
 
 def heights_of(grid: Any, dimensions: int = 2) -> Any:

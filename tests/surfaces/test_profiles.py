@@ -263,7 +263,22 @@ class TestSeveral:
         assert not any("isotropy is assumed" in doubt for doubt in stated.doubts)
         assert any("the surface is isotropic" in each for each in assumptions(stated))
 
-    def test_refusals(self, tmp_path):
+    def test_long_traces_of_a_tested_kind_are_valid(self):
+        lines = [0.005 * rough_line(seed) for seed in range(4)]
+        found = Surface.from_profile(lines, 1.0, isotropic=True)
+        pressed = contact(found, area=[0.02, 0.2], theory="calibrated")
+        assert pressed.valid.all(), pressed.reasons
+        assert "the surface is isotropic" in repr(pressed)
+        for other in (
+            Surface.from_profile(lines, 1.0),
+            Surface.from_profile(lines[:1], 1.0, isotropic=True),
+            Surface.from_profile([np.exp(8 * one) for one in lines], 1.0, isotropic=True),
+        ):
+            assert not contact(other, area=0.1, theory="calibrated").valid
+        # what other theories state has no sampling error
+        assert not contact(found, area=0.1, theory="persson").valid
+
+    def test_refusals(self):
         line = rough_line()
         with pytest.raises(InputError, match="isotropic=True is of traces in one"):
             Surface.from_profile(line, 1.0, across=line, isotropic=True)

@@ -262,11 +262,60 @@ class TestReading:
             ):
                 Surface.from_map(tmp_path / name)
 
-    def test_a_list_of_points_with_gaps_is_no_matrix(self, tmp_path):
-        np.savetxt(tmp_path / "a.txt", np.delete(LIST, [3, 77], axis=0))
-        for dx in (None, 1.0):
-            with pytest.raises(InputError, match="give missing ones a row with NaN"):
-                Surface.from_map(tmp_path / "a.txt", dx)
+    def test_missing_rows_of_a_list_are_undefined_points(self, tmp_path):
+        # a whole row of the map is missing, too
+        missing = [3, 77, *range(5 * len(MAP), 6 * len(MAP))]
+        full = LIST.copy()
+        full[missing, 2] = np.nan
+        np.savetxt(tmp_path / "full.txt", full)
+        expected = Surface.from_map(tmp_path / "full.txt", fill="harmonic")
+        less = np.delete(LIST, missing, axis=0)
+        less = less[np.random.default_rng(1).permutation(len(less))]
+        np.savetxt(tmp_path / "a.xyz", less, header="Lateral units: um\nValue units: um")
+        np.savetxt(tmp_path / "b.csv", less, delimiter=";")
+        text = (tmp_path / "b.csv").read_text(encoding="utf-8")
+        (tmp_path / "b.csv").write_text(text.replace(".", ","), encoding="utf-8")
+        for name, unit in (("a.xyz", "um"), ("b.csv", None)):
+            found = Surface.from_map(tmp_path / name, fill="harmonic")
+            np.testing.assert_allclose(
+                found.map.heights, expected.map.heights, atol=1e-9, rtol=0
+            )
+            assert found.map.steps == pytest.approx(expected.map.steps)
+            assert found.unit == unit
+            assert any("were undefined" in str(r.get("told")) for r in found.provenance)
+
+    def test_points_off_a_grid_are_refused(self, tmp_path):
+        path = tmp_path / "a.txt"
+        step = LIST[1, 1] - LIST[0, 1]
+        off = LIST.copy()
+        off[7, 1] += 0.4 * step
+        twice = np.concatenate([LIST, LIST[5:6]])
+        for rows, message in (
+            (off, "of a grid|off a grid"),
+            (twice, "several heights at one x and y"),
+            (np.delete(LIST, slice(40, -40), axis=0)[::3], "of a grid|off a grid"),
+            (LIST * [1.0, 0.0, 1.0], "have one y"),
+        ):
+            np.savetxt(path, rows)
+            with pytest.raises(InputError, match=message):
+                Surface.from_map(path)
+
+    def test_mixed_decimal_marks_are_refused(self, tmp_path):
+        # a reader takes the rows up to the last one with a comma as a header
+        path = tmp_path / "a.txt"
+        np.savetxt(path, np.c_[np.arange(200.0), MAP.ravel()[:200]])
+        lines = path.read_text(encoding="utf-8").splitlines()
+        lines[10] = lines[10].replace(".", ",")
+        path.write_text("\n".join(lines), encoding="utf-8")
+        with pytest.raises(InputError, match="commas in line 11 and none in line 1:"):
+            Surface.from_profile(path)
+
+    def test_a_gap_in_a_line_is_refused(self, tmp_path):
+        x = np.arange(200.0)
+        x[50:] += 3
+        np.savetxt(tmp_path / "a.txt", np.c_[x, MAP.ravel()[:200]])
+        with pytest.raises(InputError, match="no points between x = 49 and 53"):
+            Surface.from_profile(tmp_path / "a.txt")
 
     def test_a_file_knows_its_lengths_and_unit(self, tmp_path):
         path = tmp_path / "a.nc"
