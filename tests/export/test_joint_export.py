@@ -290,7 +290,7 @@ def test_gapcon_has_the_gas(target, joint, total, tmp_path):
 
 
 # of UINTER, in the order of the manual
-LISTED = template("code/languages/uinter.c").partition("#define UINTER_ARGUMENTS")[2]
+LISTED = template("code/subroutines/uinter.c").partition("#define UINTER_ARGUMENTS")[2]
 ARGUMENTS = re.findall(r"\w+", LISTED.partition("#endif")[0])
 
 

@@ -4,6 +4,7 @@ import dataclasses
 import functools
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tokenize
@@ -113,7 +114,7 @@ RUN = {
 def test_a_language_reads_a_file_with_such_a_name(target, of, tmp_path):
     file, command = RUN[target]
     program = "gcc" if target == "c-law" else command[0]
-    if law_points.shutil.which(program) is None:
+    if shutil.which(program) is None:
         pytest.skip(f"not installed: {program}")
     made = hostile(of)
     (tmp_path / file).write_text(text_of(target, made))

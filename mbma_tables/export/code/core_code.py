@@ -10,7 +10,6 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.contacts.law import block as at
 from mbma_tables.export.code.language import (
-    FOLDER,
     AskedLaw,
     Language,
     Program,
@@ -127,15 +126,9 @@ def core_text(prefix: str) -> str:
 def _code_mark() -> str:
     """A number of all code that laws in one file share, where other code is refused."""
     code = core_text("")
-    for name in (
-        "law.c",
-        "interfaces.c",
-        "friction.c",
-        "uinter.c",
-        "vuinter.c",
-        "gapcon.c",
-    ):
-        code += template(f"{FOLDER}/{name}")
+    names = ("interfaces", "friction", "uinter", "vuinter", "gapcon")
+    for name in ("languages/law", *(f"subroutines/{name}" for name in names)):
+        code += template(f"code/{name}.c")
     return f"0x{zlib.crc32(code.encode()):08x}"
 
 

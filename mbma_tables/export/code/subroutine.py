@@ -32,7 +32,7 @@ def subroutine(
     friction: tuple[str, str] | None = None,
     **texts: str,
 ) -> Language:
-    """The C of a law with a routine, whose template is languages/ROUTINE.c; `texts` are those of the documentation."""
+    """The C of a law with a routine, whose template is subroutines/ROUTINE.c; `texts` are those of the documentation."""
     return c_language(
         usage,
         # of Abaqus, and of Abaqus/Explicit

@@ -1,25 +1,27 @@
 """Contact laws as source code: a file a language, with its templates beside it.
 
-A file of this folder has `LANGUAGES`, by the names of their targets. All files are loaded;
-there is no list of them.
+A file of this folder has `LANGUAGES`, by the names of their targets, and so have those of
+`subroutines`. All files are loaded; there is no list of them.
 """
 
 import importlib
 import pkgutil
+from types import ModuleType
 
+from mbma_tables.export.code import subroutines
 from mbma_tables.export.code.language import Language
 
 
-def _all_languages() -> dict[str, Language]:
-    """Languages of all files; user subroutines of solvers come last."""
+def _languages_of(package: str, path: list[str]) -> dict[str, Language]:
+    """Languages of the files of a folder."""
     languages: dict[str, Language] = {}
-    subroutines: dict[str, Language] = {}
-    for file in pkgutil.iter_modules(__path__):
-        module = importlib.import_module(f"{__name__}.{file.name}")
-        for target, language in module.LANGUAGES.items():
-            group = subroutines if language.subroutine else languages
-            group[target] = language
-    return languages | subroutines
+    for file in pkgutil.iter_modules(path):
+        module: ModuleType = importlib.import_module(f"{package}.{file.name}")
+        languages |= module.LANGUAGES
+    return languages
 
 
-LANGUAGES = _all_languages()
+LANGUAGES = {
+    **_languages_of(__name__, __path__),
+    **_languages_of(subroutines.__name__, list(subroutines.__path__)),
+}
