@@ -17,6 +17,7 @@ from mbma_tables.theories.yielding.unloading import (
     FRACTIONS,
     SHARES,
     Spots,
+    energy,
     flattened,
     lift,
 )
@@ -28,6 +29,7 @@ LARGEST_LOAD = 1 / 3  # of the hardness, above which the bulk yields
 FOLDS = 5
 MOST_SHARE = (0.35, 0.9)  # ends between which shares of `SHARES` are averaged
 START = Spots(1.16, -0.4, -2.0, -0.1, 1.4, -3.2, 0.11)
+NAMES = ("stiffness", "area", "lift", "energy")
 GROUP = ["family", "seed", "points", "psi"]
 CLASSES = {
     "psi 4 and above": (3.9, 99.0),
@@ -51,6 +53,7 @@ def _ratios(data: pd.DataFrame) -> Iterator[dict[str, Any]]:
                 "stiffness": np.log(elastic.frozen_stiffness),
                 "area": np.log(elastic.area),
                 "gap": elastic.mean_separation,
+                "energy": np.log(elastic.energy),
             }.items()
         }
         for number, peak in group[group.kind != "elastic"].groupby("peak"):
@@ -82,9 +85,13 @@ def _ratios(data: pd.DataFrame) -> Iterator[dict[str, Any]]:
                     "lift": (row.mean_separation - top.mean_separation)
                     * top.frozen_stiffness
                     / loaded.p0,
+                    "energy": row.energy * top.frozen_stiffness / loaded.p0**2,
                     "elastic_stiffness": np.exp(-moved["stiffness"]),
                     "elastic_area": np.exp(-moved["area"]),
                     "elastic_lift": -moved["gap"] * stiffness / loaded.p0,
+                    "elastic_energy": np.exp(curves["energy"](ends[0]))
+                    * stiffness
+                    / loaded.p0**2,
                 }
 
 
@@ -95,15 +102,17 @@ def predicted(rows: pd.DataFrame, stiffness: Spots, area: Spots) -> dict[str, Fl
     weight, *powers = stiffness.of(c["yielded"], c["peak_area"])
     compliance = (1 - weight) / c["elastic_stiffness"] + weight / flattened(s, *powers)
     lifted = (1 - weight) * c["elastic_lift"] + weight * lift(s, *powers)
+    given_back = (1 - weight) * c["elastic_energy"] + weight * energy(s, *powers)
     weight, *powers = area.of(c["yielded"], c["peak_area"])
     shrunk = c["elastic_area"] ** (1 - weight) * flattened(s, *powers) ** weight
-    return {"stiffness": 1 / compliance, "lift": lifted, "area": shrunk}
+    found = {"stiffness": 1 / compliance, "lift": lifted, "area": shrunk}
+    return found | {"energy": given_back}
 
 
 def deviations(
     rows: pd.DataFrame, stiffness: Spots, area: Spots
 ) -> dict[str, FloatArray]:
-    """ln(law/boundary elements) of stiffness, lift and area."""
+    """ln(law/boundary elements) of stiffness, lift, area and energy given back."""
     found = predicted(rows, stiffness, area)
     return {name: np.log(value / rows[name].to_numpy()) for name, value in found.items()}
 
@@ -145,7 +154,7 @@ def scatter_table(rows: pd.DataFrame) -> dict[str, tuple[tuple[float, ...], ...]
     """Root mean squares of deviations by share of the area that yielded, and pressure over the largest."""
     ends = (0.0, *MOST_SHARE, 1.0)
     table = {}
-    for name in ("stiffness", "area", "lift"):
+    for name in NAMES:
         lines = []
         for k in range(len(SHARES)):
             own = rows[(rows.yielded > ends[k]) & (rows.yielded <= ends[k + 1])]
@@ -153,8 +162,8 @@ def scatter_table(rows: pd.DataFrame) -> dict[str, tuple[tuple[float, ...], ...]
             for s in FRACTIONS[:-1]:
                 near = own[np.abs(np.log(own.s / s)) < 0.05]
                 line.append(rms(near[f"missed_{name}"]))
-            # at the largest pressure itself only the lift, which is zero, has a relative error
-            line.append(line[-1] if name == "lift" else 0.0)
+            # at the largest pressure itself stiffness and area are those of loading
+            line.append(0.0 if name in ("stiffness", "area") else line[-1])
             lines.append(tuple(round(float(one), 3) for one in line))
         table[name] = tuple(lines)
     return table
@@ -186,7 +195,7 @@ def report(data: pd.DataFrame) -> str:
     for label, (low, high) in CLASSES.items():
         own = above[(above.psi > low) & (above.psi < high)]
         machined = own[own.waves == 0]
-        for name in ("stiffness", "area", "lift"):
+        for name in NAMES:
             missed = own[f"missed_{name}"]
             stated = law.ratio_scatter(name, own.s.to_numpy(), own.yielded.to_numpy())
             inside = [np.mean(np.abs(missed) <= k * stated) for k in (1, 2)]

@@ -11,7 +11,7 @@ import pandas as pd
 from generate.boundary_elements.surfaces import Recipe, heights
 from generate.files import read_csv
 from generate.page import Cell, Measured, table
-from generate.unloading_fit import CLASSES, LIGHT, left_out, ratios, rms
+from generate.unloading_fit import CLASSES, LIGHT, NAMES, left_out, ratios, rms
 from mbma_tables import Bodies, Joint, Surface, contact
 from mbma_tables.common.plots import new_figure
 from mbma_tables.theories import Simulated
@@ -23,7 +23,7 @@ from mbma_tables.theories.yielding.unloading import ratio_scatter
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-NAMES = ("stiffness", "area", "lift")
+MEASURED = ("stiffness", "area", "lift")
 FACES = {"Ra 0.4 um": 0.4, "Ra 0.8 um": 0.8, "Ra 1.6 um": 1.6}
 METAL = "steel 1020"
 LOADS = ("10 MPa", "50 MPa", "100 MPa")
@@ -61,7 +61,7 @@ def accuracy(tested: pd.DataFrame) -> str:
             inside = [100 * np.mean(np.abs(missed) <= k * stated) for k in (1, 2)]
             line.append((100 * rms(missed), *inside))
         lines.append(line)
-    header = "surfaces | stiffness | area | lift"
+    header = f"surfaces | {' | '.join(NAMES)}"
     return table(header, lines, "{} | {:.1f}%; {:.0f}%, {:.0f}%")
 
 
@@ -96,7 +96,7 @@ def other() -> str:
     """Root mean squares of these, by psi."""
     missed = missed_of_others()
     lines = [
-        [psi, *(100 * rms(own[name]) for name in NAMES)]
+        [psi, *(100 * rms(own[name]) for name in MEASURED)]
         for psi, own in missed.groupby("psi")
     ]
     return table("psi | stiffness [%] | area [%] | lift [%]", lines, "{:g} | {:.1f}")
@@ -110,11 +110,11 @@ def grids(rows: pd.DataFrame) -> str:
         if len(counts) < 2:
             continue
         sides = [own[own.points == count].assign(s=own.s.round(2)) for count in counts]
-        both = [side.groupby(["s", "peak"])[list(NAMES)].mean() for side in sides]
+        both = [side.groupby(["s", "peak"])[list(MEASURED)].mean() for side in sides]
         ratio = np.log(both[0] / both[1]).dropna()
         first = own.iloc[0]
         lines.append(
-            [first.waves, first.psi, *(100 * rms(ratio[name]) for name in NAMES)]
+            [first.waves, first.psi, *(100 * rms(ratio[name]) for name in MEASURED)]
         )
     header = "longest wavelengths a side | psi | stiffness [%] | area [%] | lift [%]"
     return table(header, sorted(lines), "{:g} | {:g} | {:.1f}")

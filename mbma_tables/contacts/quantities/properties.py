@@ -258,6 +258,12 @@ class ContactQuantities:
         return value
 
     @property
+    def energy_scatter(self) -> Numbers:
+        """Model uncertainty, one standard deviation of ln `energy`: with a hardness that at this pressure, else `scatter`."""
+        value: Numbers = self.quantity("energy_scatter")
+        return value
+
+    @property
     def valid(self) -> Numbers:
         """Whether the theory was tested for such contacts; if not, `reasons` gives where and why."""
         value: Numbers = self.quantity("valid")
@@ -715,6 +721,21 @@ class LawQuantities:
         value: Numbers = contact.quantity("separation_scatter")
         return value
 
+    def energy_scatter(
+        self: Any,
+        mean_separation: ArrayLike | str | None = None,
+        *,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
+    ) -> Numbers:
+        """Model uncertainty, one standard deviation of ln `energy`: with a hardness that at this pressure, else `scatter`."""
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
+        value: Numbers = contact.quantity("energy_scatter")
+        return value
+
     def valid(
         self: Any,
         mean_separation: ArrayLike | str | None = None,
@@ -933,6 +954,11 @@ class JointQuantities:
     def separation_scatter(self: Any, pressure: ArrayLike | str) -> Numbers:
         """Model uncertainty of the mean separation at this pressure [length], `scatter` times F/(-dF/du)."""
         value: Numbers = self.at_pressure(pressure).quantity("separation_scatter")
+        return value
+
+    def energy_scatter(self: Any, pressure: ArrayLike | str) -> Numbers:
+        """Model uncertainty, one standard deviation of ln `energy`: with a hardness that at this pressure, else `scatter`."""
+        value: Numbers = self.at_pressure(pressure).quantity("energy_scatter")
         return value
 
     def valid(self: Any, pressure: ArrayLike | str) -> Numbers:

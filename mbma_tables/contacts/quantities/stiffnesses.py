@@ -88,7 +88,7 @@ def tangential_stiffness(contact: State) -> Any:
 @quantity(
     ENERGY,
     "elastic energy per nominal area, which unloading gives back",
-    uncertainty="scatter",
+    uncertainty="energy_scatter",
     error_sign=0,
     needs=(NO_ADHESION,),
     is_column=False,

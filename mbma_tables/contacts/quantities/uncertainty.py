@@ -5,7 +5,11 @@ from typing import Any
 import numpy as np
 
 from mbma_tables.common.units import Dimension
-from mbma_tables.contacts.quantities.declaration import DIMENSIONLESS, quantity
+from mbma_tables.contacts.quantities.declaration import (
+    DIMENSIONLESS,
+    of_yielding_contacts,
+    quantity,
+)
 from mbma_tables.contacts.quantities.state import State
 
 
@@ -91,6 +95,19 @@ def separation_scatter(contact: State) -> Any:
         return (
             contact.scatter * contact.answer.pressure / np.abs(contact.answer.stiffness)
         )
+
+
+@quantity(
+    DIMENSIONLESS,
+    "model uncertainty: standard deviation of ln of the energy that unloading gives back",
+    is_column=False,
+    is_listed=of_yielding_contacts,
+)
+def energy_scatter(contact: State) -> Any:
+    """Model uncertainty, one standard deviation of ln `energy`: with a hardness that at this pressure, else `scatter`."""
+    if not contact.yields:
+        return contact.scatter
+    return scatter_of_theory(contact.unloading(), "energy")
 
 
 @quantity(DIMENSIONLESS, "whether the theory was tested for such contacts")

@@ -362,10 +362,11 @@ class UnloadedMap(Unloading):
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         peak = self.peak(surface)
         on_branch = peak.remembered & (area < peak.area)
-        loading = self.loading.scatter(surface, quantity, np.asarray(area, dtype=float))
+        asked = "pressure" if quantity == "energy" else quantity
+        loading = self.loading.scatter(surface, asked, np.asarray(area, dtype=float))
         if not on_branch.any():
             return loading
-        name = "stiffness" if quantity == "unloading_stiffness" else quantity
+        name = "stiffness" if asked == "unloading_stiffness" else asked
         # areas of both branches differ by what edges of yielded points take
         own_area = area * peak.elastic.area / peak.area
         own = self.branch_theory.scatter(surface, name, own_area)

@@ -37,7 +37,7 @@ from mbma_tables.theories.base import (
     unfinished,
 )
 from mbma_tables.theories.inversion import Curve, Indices
-from mbma_tables.theories.yielding.theory import Yielding
+from mbma_tables.theories.yielding.theory import Yielding, elastic_scatter
 
 # pressure over the largest, below which force is a power of the distance to last contact:
 # the elastic contact at such forces is within rounding of its last contact
@@ -66,6 +66,12 @@ SCATTER: dict[str, tuple[tuple[float, ...], ...]] = {
         (0.070, 0.073, 0.061, 0.051, 0.046, 0.038, 0.028, 0.017, 0.017),
         (0.123, 0.101, 0.076, 0.055, 0.044, 0.033, 0.017, 0.007, 0.007),
     ),
+    # over p0^2/K0
+    "energy": (
+        (0.301, 0.240, 0.134, 0.085, 0.060, 0.041, 0.033, 0.030, 0.030),
+        (0.282, 0.237, 0.181, 0.141, 0.114, 0.085, 0.063, 0.053, 0.053),
+        (0.397, 0.313, 0.235, 0.180, 0.152, 0.115, 0.077, 0.060, 0.060),
+    ),
 }
 SOFTEST = (
     0.033  # hardness over E* times the rms gradient, of the softest that was unloaded
@@ -74,7 +80,7 @@ ROUNDING = 1e-9
 
 
 def ratio_scatter(quantity: str, s: FloatArray, yielded: FloatArray) -> FloatArray:
-    """Standard deviation of ln of "stiffness", "area" or "lift" over what it is at the largest pressure."""
+    """Standard deviation of ln of "stiffness", "area", "lift" or "energy", in numbers of the largest pressure."""
     log_s = np.log(np.clip(s, FRACTIONS[0], 1.0))
     rows = [np.interp(log_s, np.log(FRACTIONS), row) for row in SCATTER[quantity]]
     place = np.interp(yielded, SHARES, range(len(SHARES)))
@@ -526,11 +532,18 @@ class Unloading(Theory):
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """That of first loading at the largest pressure, with that of the branch from there.
 
-        "stiffness" is that of reloading, which is the unloading stiffness.
+        "stiffness" is that of reloading, which is the unloading stiffness; "energy" is what
+        unloading from a pressure gives back.
         """
         peak = self.peak(surface)
+        area = np.asarray(area, dtype=float)
         on_branch = peak.remembered & (area < peak.area)
-        loading = self.loading.scatter(surface, quantity, np.asarray(area, dtype=float))
+        if quantity == "energy":
+            # heavier contacts give nothing back on this branch, and elastic ones all
+            on_branch = peak.remembered
+            loading = elastic_scatter(self.elastic, surface, "pressure", area)
+        else:
+            loading = self.loading.scatter(surface, quantity, area)
         if not on_branch.any():
             return loading
         shape = np.broadcast_shapes(np.shape(area), np.shape(peak.area), surface.shape)
@@ -538,7 +551,7 @@ class Unloading(Theory):
         if quantity == "pressure":
             branch = self._pressure_scatter(surface, peak, s)
         else:
-            name = "area" if quantity == "area" else "stiffness"
+            name = quantity if quantity in ("area", "energy") else "stiffness"
             asked = quantity if quantity == "area" else "unloading_stiffness"
             first = self.loading.scatter(surface, asked, peak.area)
             branch = np.hypot(first, ratio_scatter(name, s, peak.yielded))

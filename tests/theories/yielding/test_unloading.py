@@ -267,7 +267,8 @@ def test_the_law_holds_for_the_boundary_elements():
     rows = rows[(rows.waves != 2) & (rows.s > 0.095)]
     missed = unloading_fit.deviations(rows, law.STIFFNESS, law.CONTACT)
     yields = rows.psi.to_numpy() > 3.9
-    for name, goal in {"stiffness": 0.12, "area": 0.06, "lift": 0.05}.items():
+    goals = {"stiffness": 0.12, "area": 0.06, "lift": 0.05, "energy": 0.15}
+    for name, goal in goals.items():
         stated = law.ratio_scatter(name, rows.s.to_numpy(), rows.yielded.to_numpy())
         ratio = np.abs(missed[name]) / stated
         assert 0.6 < np.mean(ratio < 1) < 0.95
@@ -288,6 +289,23 @@ def test_stated_scatter_is_at_the_pressure_of_a_contact_area(theory):
     np.testing.assert_allclose(found, s, rtol=1e-9)
     # without contact the scatter of the lightest counts
     assert engine._pressure_ratio(peak, np.array(0.0)) == pytest.approx(0.01)
+
+
+def test_the_energy_given_back_has_a_scatter_of_its_own():
+    """That of simulations, with that of the stiffness at the largest pressure; that of first loading begins a branch."""
+    pressed = unloaded(["10 MPa", "99.999 MPa", "100 MPa"])
+    first = contact(FACE, BODIES, pressure=LARGEST, theory="calibrated")
+    of_stiffness = first.unloading_stiffness_scatter
+    stated = law.ratio_scatter("energy", np.array([0.1, 1.0]), first.yielded)
+    np.testing.assert_allclose(
+        pressed.energy_scatter[:2], np.hypot(of_stiffness, stated), rtol=1e-3
+    )
+    np.testing.assert_allclose(
+        pressed.energy_scatter[1:], first.energy_scatter, rtol=1e-3
+    )
+    assert (pressed.scatter_of("energy") == pressed.energy_scatter).all()
+    elastic = contact(FACE, Bodies("100 GPa"), pressure=LARGEST, theory="calibrated")
+    assert elastic.energy_scatter == elastic.scatter
 
 
 def test_unloading_is_that_of_another_program():
