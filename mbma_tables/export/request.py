@@ -501,6 +501,11 @@ def _of_code(
     language = LANGUAGES.get(target)
     notes: list[str] = []
     if subject.largest_pressure is not None:
+        if language and language.conductance_alone:
+            raise InputError(
+                f"{target} is of conductance alone, which jumps at the largest pressure: "
+                "rows have it, as of abaqus and calculix"
+            )
         notes.append(
             "without tangential stiffness and conductance, which jump at the largest pressure: "
             "rows have them"

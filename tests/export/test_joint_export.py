@@ -79,6 +79,40 @@ def test_every_target_takes_a_joint_with_a_name(joint, target, tmp_path):
         assert "bolt" in path.read_text()
 
 
+ALONE = ("abaqus-gapcon", "calculix-gapcon")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", OF_LAWS)
+def test_every_target_takes_a_joint_about_its_preload(joint, target, tmp_path):
+    """Each file states it, or why it has no such law."""
+    if target == "parquet":
+        pytest.importorskip("pyarrow")
+    kind = targets()[target]
+    preloaded = joint.after("50 MPa")
+    path = tmp_path / f"bolt{kind.end or '.txt'}"
+    options = {"binaries": "none"} if target in ("fmu", "fmu3") else {}
+    span = SPAN if kind.rows else None
+    options |= {"rows": 8} if kind.rows else {}
+
+    def written():
+        files = preloaded.export(target, span, name="bolt", path=path, **options)
+        return b"".join(each.read_bytes() for each in files)
+
+    if target in ALONE:
+        with pytest.raises(InputError, match="jumps at the largest pressure: rows"):
+            written()
+        return
+    content = written()
+    if target in ("fmu", "fmu3"):
+        with zipfile.ZipFile(path) as archive:
+            content = b"".join(map(archive.read, archive.namelist()))
+    # without line ends and the marks of comments after them
+    text = re.sub(rb"\s+(\W{1,3}\s)?", b" ", content)
+    assert b"after a largest pressure of 50" in text
+    assert b"loading only" not in text
+
+
 def test_rows_have_the_conductance_of_the_gas_too(joint, total):
     """4,604 W/(m^2 K) of the solid at 1 MPa are 16,194 with air."""
     pressures = np.array([0.1, 1.0, 10.0])
