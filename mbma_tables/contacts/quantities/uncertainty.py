@@ -7,7 +7,7 @@ import numpy as np
 from mbma_tables.common.units import Dimension
 from mbma_tables.contacts.quantities.declaration import (
     DIMENSIONLESS,
-    of_yielding_contacts,
+    on_request,
     quantity,
 )
 from mbma_tables.contacts.quantities.state import State
@@ -101,7 +101,7 @@ def separation_scatter(contact: State) -> Any:
     DIMENSIONLESS,
     "model uncertainty: standard deviation of ln of the energy that unloading gives back",
     is_column=False,
-    is_listed=of_yielding_contacts,
+    is_listed=on_request,
 )
 def energy_scatter(contact: State) -> Any:
     """Model uncertainty, one standard deviation of ln `energy`: with a hardness that at this pressure, else `scatter`."""
