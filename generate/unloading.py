@@ -53,7 +53,12 @@ REFINED = (
     37,
     60,
 )  # turns whose surface is solved on a grid twice as fine, too
+# spectra of several maps each, which no fit sees: Hurst exponent and psi; longest wavelengths
+# and grid points a side, and maps
+REPEATED = ((0.5, 4.0), (0.9, 16.0))
+REPEATS = ((4, 256, 6), (8, 512, 5))
 FILE = DATA / "unloading.csv.gz"
+CELLS = DATA / "unloading_cells.csv.gz"
 HEAD = """\
 # Contacts loaded to p0 with pressures capped at a hardness and unloaded elastically, by python -m generate unloading.
 # kind loaded: the way to p0; unloaded: p = s p0 after p0 of the same row; elastic: no hardness, on the map as it was.
@@ -101,6 +106,18 @@ def groups() -> list[Group]:
         if turn in REFINED:
             finer = dataclasses.replace(recipe, points=2 * points)
             chosen.append(Group(finer, psi))
+    return chosen
+
+
+def repeats() -> list[Group]:
+    """Groups of one spectrum that differ by their random numbers alone."""
+    chosen = list[Group]()
+    for turn, (waves, points, count) in enumerate(REPEATS):
+        for number in range(count * len(REPEATED)):
+            hurst, psi = REPEATED[number % len(REPEATED)]
+            seed = 9000 + 100 * turn + number
+            recipe = Recipe("self_affine", hurst, 8.0, waves, seed, points)
+            chosen.append(Group(recipe, psi))
     return chosen
 
 
@@ -168,10 +185,10 @@ def described(group: Group) -> dict[str, Any]:
     return own | {"points": surface.points, "psi": group.psi}
 
 
-def gathered(folder: pathlib.Path) -> pd.DataFrame:
-    """Rows of the groups that are solved."""
+def gathered(folder: pathlib.Path, asked: list[Group]) -> pd.DataFrame:
+    """Rows of those groups that are solved."""
     frames = []
-    for group in groups():
+    for group in asked:
         path = folder / f"{group.name}.npz"
         if path.exists():
             with np.load(path, allow_pickle=False) as content:
@@ -205,12 +222,15 @@ def unloading(folder: pathlib.Path, collect: bool, fit: bool, out: pathlib.Path)
         click.echo(report(read_csv(out)))
         return
     if not collect:
-        tasks = [Task(cast(Recipe, group), "") for group in groups()]
+        tasks = [Task(cast(Recipe, group), "") for group in [*groups(), *repeats()]]
         campaigns.run(tasks, folder, 1, solved)
         return
-    frame = gathered(folder)
-    write_file(out, gzip.compress(to_csv(HEAD, frame, "%.6g"), mtime=0))
-    click.echo(f"{out}: {len(frame)} contacts")
+    for path, asked in ((out, groups()), (CELLS, repeats())):
+        if not any((folder / f"{group.name}.npz").exists() for group in asked):
+            continue
+        frame = gathered(folder, asked)
+        write_file(path, gzip.compress(to_csv(HEAD, frame, "%.6g"), mtime=0))
+        click.echo(f"{path}: {len(frame)} contacts")
 
 
 if __name__ == "__main__":

@@ -11,16 +11,26 @@ import pandas as pd
 from generate.boundary_elements.surfaces import Recipe, heights
 from generate.files import read_csv
 from generate.page import Cell, Measured, table
-from generate.unloading_fit import CLASSES, LIGHT, NAMES, left_out, ratios, rms
+from generate.unloading_fit import (
+    CLASSES,
+    LIGHT,
+    NAMES,
+    deviations,
+    left_out,
+    predicted,
+    ratios,
+    rms,
+)
 from mbma_tables import Bodies, Joint, Surface, contact
 from mbma_tables.common.plots import new_figure
 from mbma_tables.theories import Simulated
 from mbma_tables.theories.simulated.boundary_elements import (
     BoundaryElementContact as BoundaryElements,
 )
-from mbma_tables.theories.yielding.unloading import ratio_scatter
+from mbma_tables.theories.yielding.unloading import CONTACT, STIFFNESS, ratio_scatter
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 MEASURED = ("stiffness", "area", "lift")
@@ -40,6 +50,8 @@ def measure() -> Measured:
     tested = left_out(rows[rows.waves != 2])
     parts = {
         "accuracy": accuracy(tested),
+        "random": accuracy(tested[tested.waves > 0]),
+        "cells": cells(),
         "other": other(),
         "grids": grids(rows),
         "maps": maps(),
@@ -63,6 +75,26 @@ def accuracy(tested: pd.DataFrame) -> str:
         lines.append(line)
     header = f"surfaces | {' | '.join(NAMES)}"
     return table(header, lines, "{} | {:.1f}%; {:.0f}%, {:.0f}%")
+
+
+def cells() -> str:
+    """The law against maps of one spectrum that no fit saw, against their means, and how the maps differ."""
+    rows = ratios(read_csv("unloading_cells.csv.gz"))
+    rows = rows[rows.s > LIGHT].assign(at=rows.s.round(2))
+    lines: list[list[Cell]] = []
+    for (waves, psi), own in rows.groupby(["waves", "psi"]):
+        for name, missed in deviations(own, STIFFNESS, CONTACT).items():
+            alike = own.assign(missed=missed, value=np.log(own[name]))
+            same = alike.groupby(["peak", "at"])
+            differs = np.sqrt(same.value.var().mean())
+            means = rms(same.missed.mean())
+            each: list[Cell] = [name, 100 * rms(missed), 100 * means, 100 * differs]
+            lines.append([int(waves), psi, own.group.nunique(), *each])
+    header = (
+        "longest wavelengths a side | psi | maps | ratio | law against each map [%] | "
+        "against their mean [%] | maps among themselves [%]"
+    )
+    return table(header, lines, "{:g} | {:g} | {:g} | {} | {:.1f}")
 
 
 def missed_of_others() -> pd.DataFrame:
@@ -165,9 +197,9 @@ def settling() -> str:
 
 
 def draw(rows: pd.DataFrame) -> Figure:
-    """A loop of pressure over gap, and stiffness below the largest pressure against simulations."""
-    figure = new_figure(10, 4.2)
-    loop, ratio = figure.subplots(1, 2)
+    """A loop of pressure over gap, stiffness below the largest pressure, and a residual shape."""
+    figure = new_figure(13, 4.2)
+    loop, ratio, shape = figure.subplots(1, 3)
     steel = joint(0.8)
     # denser at light loads, where gaps grow fastest
     share = np.linspace(0.0, 1.0, 120) ** 4
@@ -179,13 +211,37 @@ def draw(rows: pd.DataFrame) -> Figure:
     loop.set_xlabel("mean gap u [um]")
     loop.set_ylabel("pressure [MPa]")
     loop.legend()
-    for psi in SHOWN:
+    for color, psi in zip(("C0", "C1"), SHOWN, strict=True):
         own = rows[np.isclose(rows.psi, psi) & (rows.waves > 2)]
-        ratio.plot(own.s, own.stiffness, ".", ms=3, label=f"simulated, psi {psi:g}")
+        law = own.assign(law=predicted(own, STIFFNESS, CONTACT)["stiffness"])
+        mean = law.groupby(law.s.round(2)).law.mean()
+        label = f"simulated, psi {psi:g}"
+        ratio.plot(own.s, own.stiffness, ".", ms=3, color=color, label=label)
+        ratio.plot(mean.index, mean, color=color, label=f"law, psi {psi:g}")
     s = np.linspace(0.005, 1, 100)
     ratio.plot(s, s**0.5, "k:", label="s^(1/2)")
     ratio.plot(s, s, "k--", lw=0.8, label="s")
     ratio.set_xlabel("s = p/p0")
     ratio.set_ylabel("K/K0")
     ratio.legend()
+    draw_residual(shape)
     return figure
+
+
+def draw_residual(axes: Axes) -> None:
+    """Highest profile of a map before a load and after it."""
+    before = heights(Recipe("self_affine", 0.8, 8.0, 4, 77, POINTS // 2))
+    before = before / np.std(before)
+    side = float(len(before))
+    gradient = float(Surface.from_map(before, 1.0, periodic=True).rms_gradient)
+    engine = BoundaryElements(before, (side, side), FINE_TOLERANCE, gradient / PSI)
+    engine.press(2 * SHARES_OF_HARDNESS[0] * gradient / PSI)
+    row = int(np.argmax(before.max(axis=1)))
+    axes.plot(before[row], lw=0.8, label="before")
+    axes.plot(
+        engine.residual_heights()[row],
+        label=f"after {2 * SHARES_OF_HARDNESS[0]:g} of the hardness",
+    )
+    axes.set_xlabel("place")
+    axes.set_ylabel("height [h_rms]")
+    axes.legend()
