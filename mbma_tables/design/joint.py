@@ -532,7 +532,7 @@ class Joint(JointQuantities, Displayed):
         if "island_model" in options:
             options["island_model"] = beside(options["island_model"], path.parent)
         if options:
-            given["theory"] = resolve(given.get("theory", "mbma"), options=options)
+            given["theory"] = resolve(given.get("theory"), options=options)
         for name in FACES:
             part = given.get(name)
             if isinstance(part, Mapping) and "map" in part:

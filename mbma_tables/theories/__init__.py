@@ -106,7 +106,7 @@ def resolve(
     Mbma(rtol=0.0001)
     """
     chosen: Any = theory
-    if chosen is None and surface is not None:
+    if chosen is None and (surface is not None or options):
         chosen = default_name(surface, given_name, options)
     if isinstance(chosen, str) and chosen in NAMED:
         chosen = _with_options(chosen, options) if options else shipped(chosen)
@@ -163,7 +163,7 @@ def _with_options(name: str, options: Mapping[str, Any]) -> Any:
 
 
 def default_name(
-    surface: AnySurface,
+    surface: AnySurface | None,
     given_name: str | None = None,
     options: Collection[str] = (),
 ) -> str:
@@ -171,8 +171,8 @@ def default_name(
 
     Parameters
     ----------
-    surface : Surface
-        One surface or a batch.
+    surface : Surface or None
+        One surface or a batch; None where options alone say which theory it is.
     given_name : str, optional
         The quantity at which the contact is asked for, "separation", "mean_separation",
         "pressure" or "area"; None for laws and curves, which are functions of the mean

@@ -236,13 +236,16 @@ def test_shipped_costs_have_what_plans_need():
     needed = dict.fromkeys(("exact", "universal", "rigid"), calls) | {
         "law": ("lookup", "invert")
     }
-    needed |= dict.fromkeys(THEORIES[1:], ("gap", "call", "law"))
+    # a theory whose costs are not measured takes an rtol, no time budget
+    measured = [name for name in THEORIES if costs.of(name, "yield once") > 0]
+    assert {"mbma", "calibrated", "persson", "greenwood_williamson"} <= set(measured)
+    needed |= dict.fromkeys(measured[1:], ("gap", "call", "law"))
     needed |= {"exact": (*calls, "profile"), "scene": ("call",), "island4d": ("gap",)}
     for name, whats in needed.items():
         for what in whats:
             assert 0 < costs.of(name, what, 1e-4) < 10, (name, what)
     parts = ("inverse", "energy", "leakage", "yield", "yield inverse")
-    for theory in THEORIES:
+    for theory in measured:
         for part in parts:
             for what in (f"{part} once", f"{part} gap"):
                 assert 0 < costs.of(theory, what) < 1, (theory, what)

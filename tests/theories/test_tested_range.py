@@ -41,7 +41,10 @@ def test_valid_implies_within_the_range_of_the_simulations(theory):
         surface, mean_separation=surface.h_max * (1 - depth), theory=theory, **options
     )
     valid = pressed.valid
-    assert valid.sum() > (5 if theory == "greenwood_williamson" else 30)
+    # a theory that was not compared with simulations is never valid
+    least = 0 if np.isnan(pressed.scatter).all() else 6
+    assert valid.sum() >= (least if theory == "greenwood_williamson" else 5 * least)
+    assert least or not valid.any()
     assert (surface.hurst[valid] >= least_hurst * (1 - 1e-9)).all()
     assert (surface.zeta_1[valid] >= min(zetas) * (1 - 1e-9)).all()
     assert (surface.zeta_1[valid] <= max(zetas) * (1 + 1e-9)).all()

@@ -409,7 +409,7 @@ class Scene:
         if OF_SUMS in options:
             options[OF_SUMS] = beside(options[OF_SUMS], folder)
         if options:
-            given["theory"] = resolve(given.get("theory", "mbma"), options=options)
+            given["theory"] = resolve(given.get("theory"), options=options)
         return cls(specimen.surface, **given)
 
     def plan(self) -> Plan:
