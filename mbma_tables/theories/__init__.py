@@ -204,7 +204,7 @@ def default_name(
         return "mbma"
     if getattr(surface, "table", None) is not None:
         return "simulated"
-    if getattr(surface, "map", None) is None:
+    if surface is None or getattr(surface, "map", None) is None:
         return "calibrated"
     from mbma_tables.theories.simulated.theory import is_default
 
