@@ -261,7 +261,7 @@ class TestCache:
     def test_a_second_process_simulates_nothing(self, place, monkeypatch):
         first = self.pressed()
         flows = first.flows
-        monkeypatch.setattr(pressing, "Contact", None)
+        monkeypatch.setattr(pressing, "BoundaryElementContact", None)
         monkeypatch.setattr(pressing, "flow_tensor", None)
         for again in (self.pressed(), self.pressed(1e-3, "mm")):
             np.testing.assert_allclose(again.rows[:2], first.rows[:2], rtol=1e-9)
@@ -271,7 +271,7 @@ class TestCache:
         )
 
     def test_it_goes_on_where_it_was_interrupted(self, place, monkeypatch):
-        real = pressing.Contact
+        real = pressing.BoundaryElementContact
         calls = []
 
         class Interrupted(real):
@@ -281,7 +281,7 @@ class TestCache:
                     raise KeyboardInterrupt
                 return super().press(force)
 
-        monkeypatch.setattr(pressing, "Contact", Interrupted)
+        monkeypatch.setattr(pressing, "BoundaryElementContact", Interrupted)
         with pytest.raises(KeyboardInterrupt):
             self.pressed()
         assert len(cache.files()) == 4
