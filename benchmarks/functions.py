@@ -27,7 +27,8 @@ ISLAND_POINTS = 100_000  # an exact island takes 20 us
 UNIT = {"low": 0.0, "high": 1.0}
 HEADER = (
     "function | axes | target | cells | coefficients | made in | largest error | "
-    "of points | above the bound | one of many | with derivatives"
+    "of points | above the bound | in C | in C with derivatives | "
+    "lookup | lookup with derivatives"
 )
 
 
@@ -129,6 +130,8 @@ def row_of(
     )
     taken = rounds(
         {
+            "core": functools.partial(table._answers, x, False),
+            "core slopes": functools.partial(table._answers, x, True),
             "values": functools.partial(table.lookup, *x.T),
             "slopes": functools.partial(table.lookup, *x.T, derivatives=1),
         }
