@@ -11,7 +11,7 @@ import math
 import platform
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib import metadata
 from typing import Any
 
@@ -377,7 +377,7 @@ def theory_rows() -> Iterator[Row]:
             yield Row(name, at("law", rtol), "both", None, cost)
 
 
-def effect_rows() -> Iterator[Row]:
+def effect_rows(effects: Sequence[str] = tuple(EFFECTS)) -> Iterator[Row]:
     """What effects of scenes cost besides pressures and areas at given gaps: once, and for each gap."""
     surface = SURFACES[3]
     farthest = float(surface.h_max)
@@ -409,7 +409,7 @@ def effect_rows() -> Iterator[Row]:
         base = {
             count: run(theory, "base", count) for count in (1, MANY, *COUNTS.values())
         }
-        for part in EFFECTS:
+        for part in effects:
             if part == "base" or (part == "slopes" and theory != "mbma"):
                 continue
             count = COUNTS.get(part, MANY)
@@ -470,17 +470,22 @@ def again(island_model: str) -> bytes:
     one another.
     """
     models = (island_model,)
-    measured = [
+    return replaced(
         row
         for rows in (model_rows, gap_rows, law_making_rows, first_use_rows)
         for row in rows(models)
-    ]
+    )
+
+
+def replaced(measured: Iterable[Row]) -> bytes:
+    """The shipped costs with rows that were measured anew, in the same places."""
     path = ROOT / "tables" / "cost.csv"
     text = path.read_text(encoding="utf-8")
     head = "".join(line for line in text.splitlines(True) if line.startswith("#"))
     frame = read_csv(path)
     key = ["island_model", "variant", "quantity"]
-    fresh = pd.DataFrame(measured).set_index(key)
+    numeric = dict.fromkeys(("error", "cost", "evaluations"), float)
+    fresh = pd.DataFrame(list(measured)).astype(numeric).set_index(key)
     numbers = frame.set_index(key)
     missing = fresh.index.difference(numbers.index)
     if len(missing):
@@ -497,7 +502,12 @@ def again(island_model: str) -> bytes:
     type=click.Choice([name for name in ISLAND_MODELS if name != "exact"]),
     help="Only this island model; the others' rows stay.",
 )
-def cost(model: str | None) -> None:
+@click.option(
+    "--effect",
+    type=click.Choice([name for name in EFFECTS if name != "base"]),
+    help="Only what this adds to scenes by every theory; other rows stay.",
+)
+def cost(model: str | None, effect: str | None) -> None:
     """Measure tables/cost.csv and tables/distance.csv.
 
     For `mbma cost`, plans of scenes and docs/cost.md.
@@ -508,6 +518,8 @@ def cost(model: str | None) -> None:
             "cost": functools.partial(again, model),
             "distance": functools.partial(cost_distances.again, model),
         }
+    if effect is not None:
+        studies = {"cost": lambda: replaced(effect_rows([effect]))}
     for name, content in studies.items():
         write_file(ROOT / "tables" / f"{name}.csv", content(), make_folders=True)
         click.echo(f"tables/{name}.csv")
