@@ -31,6 +31,7 @@ COMMANDS = {
     "gas_flow": "generate.gas_flow",
     "machined": "generate.machined.campaign",
     "profiles": "generate.machined.profiles",
+    "last_octave": "generate.machined.last_octave",
     "quantities": "generate.quantities",
     "raw_maps": "generate.machined.raw_maps",
     "rough_spheres": "generate.rough_spheres",

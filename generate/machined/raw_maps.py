@@ -49,6 +49,7 @@ FINEST = 4  # every so many maps, at four times the points
 KINDS = {**FAMILIES, **UNSEEN}
 QUANTITIES = ("area", "mean_separation", "stiffness", "flow_x", "flow_y")
 SCATTERS = ("area_scatter", "scatter", "stiffness_scatter", "flow_scatter")
+ANSWERS = (*(f"answer_{name}" for name in QUANTITIES), *SCATTERS, "valid", "flow_valid")
 
 
 def raw(kind: str, number: int) -> tuple[FloatArray, bool]:
@@ -140,12 +141,6 @@ def rows_of(kind: str, number: int, finest: bool) -> Iterator[dict[str, Any]]:
     answers = answered(surface, pressures)
     simulated: Any = start.surface
     named["anisotropy"] = float(f"{simulated.anisotropy or 1.0:.3g}")
-    columns = (
-        *(f"answer_{name}" for name in QUANTITIES),
-        *SCATTERS,
-        "valid",
-        "flow_valid",
-    )
     for times in (1, 2, 4) if finest else (1, 2):
         truths = pressed(simulated.map.heights, periodic, pressures, times)
         for pressure, truth, answer in zip(pressures, truths, answers, strict=True):
@@ -153,16 +148,59 @@ def rows_of(kind: str, number: int, finest: bool) -> Iterator[dict[str, Any]]:
                 named
                 | {"times": times, "pressure": pressure}
                 | dict(zip(QUANTITIES, truth, strict=True))
-                | dict(zip(columns, answer, strict=True))
+                | dict(zip(ANSWERS, answer, strict=True))
             )
+
+
+def errors(data: pd.DataFrame) -> dict[str, tuple[pd.Series, pd.Series]]:
+    """Errors of rows, of logarithms, and the standard deviations stated, by quantity.
+
+    Those of the pressure are at equal gap, the others at equal pressure; flow counts along open
+    axes.
+    """
+    moved = data.answer_mean_separation - data.mean_separation
+    found = {
+        "area": (np.log(data.answer_area / data.area), data.area_scatter),
+        "pressure": (moved * data.stiffness / data.pressure, data.scatter),
+        "stiffness": (
+            np.log(data.answer_stiffness / data.stiffness),
+            data.stiffness_scatter,
+        ),
+    }
+    flows = []
+    for axis in "xy":
+        own = data[f"answer_flow_{axis}"]
+        true = data[f"flow_{axis}"]
+        is_open = (data.flow_valid == 1) & (data.area < OPEN) & (own > 0) & (true > 0)
+        flows.append((np.log(own[is_open] / true[is_open]), data.flow_scatter[is_open]))
+    found["flow"] = (
+        pd.concat([flows[0][0], flows[1][0]]),
+        pd.concat([flows[0][1], flows[1][1]]),
+    )
+    return found
+
+
+def asked_again(data: pd.DataFrame) -> pd.DataFrame:
+    """The same truths beside what the library, which may have changed, answers now."""
+    known = data[data.times > 0]
+    for (kind, number), rows in known.groupby(["kind", "number"]):
+        heights, periodic = raw(kind, number)
+        surface = Surface.from_map(heights, 1.0, periodic=periodic)
+        answers = answered(surface, rows.pressure.to_numpy())
+        data.loc[rows.index, list(ANSWERS)] = answers
+    return data
 
 
 @click.command()
 @click.option("--out", type=click.Path(path_type=pathlib.Path), default=FILE)
 @click.option("--each", default=4, help="Maps of each kind.")
 @click.option("--minutes", default=600.0, help="After which no new map begins.")
-def raw_maps(out: pathlib.Path, each: int, minutes: float) -> None:
+@click.option("--again", is_flag=True, help="Only ask the library again.")
+def raw_maps(out: pathlib.Path, each: int, minutes: float, again: bool) -> None:
     """Simulate raw maps; stopped and called again, it goes on where it was."""
+    if again:
+        asked_again(pd.read_csv(out)).to_csv(out, index=False, float_format="%.6g")
+        return
     rows: list[Any] = pd.read_csv(out).to_dict("records") if out.exists() else []
     done = {(row["kind"], row["number"]) for row in rows}
     end = time.monotonic() + 60 * minutes

@@ -16,9 +16,10 @@ from generate.boundary_elements.evidence import Simulated
 from generate.boundary_elements.evidence import simulated as simulated_surfaces
 from generate.boundary_elements.surfaces import TRAINING, Recipe, heights
 from generate.files import ROOT, dataset, read_csv, to_csv
-from generate.machined import makers
+from generate.machined import artefacts, makers, raw_maps
 from generate.machined.campaign import FORMS
 from generate.machined.evaluation import by_family, covered, families_left_out, yielding
+from generate.machined.unseen import UNSEEN
 from generate.page import Cell, Measured, Picture, panels, printed, table
 from mbma_tables import Surface, contact, theories
 from mbma_tables.common.arguments import FloatArray
@@ -300,8 +301,56 @@ def maps() -> Measured:
         " | calibrated: area | calibrated: force | calibrated: valid"
     )
     forms = "{} | {:.1f} | {:.1f} | {:.1f} | {:.2f} ({:.2f} to {:.2f})"
-    shapes = table(header, rows, forms)
-    return {"shapes": shapes, "extrapolation": printed(EXTRAPOLATION)}, {}
+    parts = {
+        "shapes": table(header, rows, forms),
+        "extrapolation": printed(EXTRAPOLATION),
+        "artefacts": artefacts_by_group(),
+        "raw_maps": raw_maps_by_truth(),
+    }
+    return parts, {}
+
+
+def artefacts_by_group() -> str:
+    """Planted artefacts: maps told, wrong, and wrong but not told, as `artefacts` wrote them."""
+    counts = ["maps", "told", "wrong", "missed"]
+    sums = pd.read_csv(artefacts.FILE).groupby("group", sort=False)[counts].sum()
+    planted = sums.drop(index="none")
+    sums.loc["all with an artefact"] = planted.sum()
+    rows: list[list[Cell]] = [
+        [str(group), *map(int, row)] for group, row in sums.iterrows()
+    ]
+    header = "artefact | maps | told | area wrong | wrong and not told"
+    return table(header, rows, "{} | {:d}")
+
+
+def raw_maps_by_truth() -> str:
+    """Errors of default answers of raw maps and how many the scatter covers."""
+    data = pd.read_csv(raw_maps.FILE)
+    rows: list[list[Cell]] = []
+    for (times, truth), new in itertools.product(TRUTHS.items(), (False, True)):
+        chosen = (data.times == times) & (data.valid == 1)
+        found = data[chosen & (data.kind.isin(UNSEEN) == new)]
+        name = f"{'new kinds' if new else 'machined'}, {truth}"
+        for quantity, (error, scatter) in raw_maps.errors(found).items():
+            if error.empty:
+                continue
+            ratio = (error / scatter).abs()
+            shares = [(ratio < 1).mean(), (ratio < 2).mean(), ratio.max()]
+            most = error.abs().quantile(0.9)
+            rows.append([name, quantity, len(error), most, *map(float, shares)])
+    header = (
+        "maps and truth | quantity | answers | 90% of errors below"
+        " | within one | within two standard deviations | largest"
+    )
+    counts = data.groupby(["kind", "number"]).times.max()
+    loads = len(raw_maps.RANGES)
+    share = ((data.times == 1) & (data.valid == 1)).sum() / (loads * counts.size)
+    text = f"{counts.size} maps of {data.kind.nunique()} kinds; {share:.0%} of the answers are valid."
+    errors = table(header, rows, "{} | {} | {:d} | {:.1%} | {:.0%} | {:.0%} | {:.1f}")
+    return f"{text}\n\n{errors}"
+
+
+TRUTHS = {1: "same points", 2: "twice the points", 4: "four times the points"}
 
 
 def draw_families() -> Figure:

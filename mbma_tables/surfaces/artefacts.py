@@ -7,6 +7,7 @@ recognised, and on how many maps without artefacts they are seen.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Iterator
 from typing import Any
 
@@ -105,22 +106,45 @@ def _longest_part(lost: Any, axis: int) -> str:
     return f"cut out a part without them, Surface.from_map(heights[{part}], ...)"
 
 
+def clean_part(places: Any) -> str:
+    """How to leave out some places: a call with half or a quarter of the map, if one has none."""
+    cuts = []
+    for count in places.shape:
+        middle = count // 2
+        cuts.append(
+            (
+                (":", slice(None)),
+                (f":{middle}", slice(middle)),
+                (f"{middle}:", slice(middle, None)),
+            )
+        )
+    for (rows, row), (columns, column) in itertools.product(*cuts):
+        part = places[row, column]
+        if min(part.shape) >= SMALLEST and not part.any():
+            return (
+                "Cut out a part without them, "
+                f"Surface.from_map(heights[{rows}, {columns}], ...)"
+            )
+    return "No half or quarter of the map is without them: cut out a smaller part"
+
+
 def _saturation(measured: Any) -> Artefact | None:
     """Many points of exactly the highest or the lowest value, as at the end of a range."""
     levels, counts = np.unique(np.ma.compressed(measured), return_counts=True)
     if levels.size <= LEVELS:
         return None
-    for name, own in (("highest", counts[::-1]), ("lowest", counts)):
+    for name, end, own in (
+        ("highest", levels[-1], counts[::-1]),
+        ("lowest", levels[0], counts),
+    ):
         points = int(own[0])
         if points > max(SATURATED * measured.size, OFTEN * own[1 : 1 + LEVELS].max()):
             seen = (
                 f"{points} points ({points / measured.size:.2g} of all) have exactly the "
                 f"{name} value, as at the end of an instrument's range"
             )
-            remedy = (
-                "measure again with a larger range, or cut out a part without them, "
-                "Surface.from_map(heights[i:j, k:l], ...)"
-            )
+            there = clean_part(np.ma.filled(measured == end, False))
+            remedy = f"{there}, or measure again with a larger range"
             return Artefact("saturation", seen, remedy, points)
     return None
 
@@ -171,5 +195,6 @@ def highest_place(heights: FloatArray, periodic: bool) -> Artefact | None:
         f"the highest place, {points} points at heights[{top[0]}, {top[1]}], rises above "
         f"all others by more than {RISE:g} h_rms: light contacts hang on it alone"
     )
-    remedy = "cut out a part without it, Surface.from_map(heights[i:j, k:l], ...)"
+    itself = heights > heights.max() - rise
+    remedy = clean_part(itself)
     return Artefact("highest place", seen, remedy, points)

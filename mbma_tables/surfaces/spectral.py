@@ -462,23 +462,23 @@ class SpectralSurface(AnySurface):
             if sampled < shortest
             else ""
         )
-        description = (
+        known = (
             "area depends on resolution: wavelengths are known down to "
-            f"{shortest:.4g}{unit}{finer}, and without the last octave of them the rms "
-            f"gradient would be {gradient:.2f} times as large"
+            f"{shortest:.4g}{unit}{finer}"
         )
-        if self.map is not None:
-            from mbma_tables.surfaces.map_simulation import cutting
-
-            description += (
-                f"; a simulation of Surface.from_map(..., "
-                f"{cutting(2 * shortest, self.unit)}) gives the area without them"
-            )
+        # of a map it is simulated when it is asked for, as the gradient does not determine it
+        more = (
+            ", and without the last octave of them the rms gradient would be "
+            f"{gradient:.2f} times as large"
+            if self.map is None
+            else "; contact(surface, ...).resolution() simulates what the last octave of "
+            "them does to it"
+        )
         record = {
             "step": "resolution",
             "shortest": shortest,
             "gradient_without_last_octave": gradient,
-            "told": description,
+            "told": known + more,
         }
         return dataclasses.replace(self, provenance=(*self.provenance, record))
 

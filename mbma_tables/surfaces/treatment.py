@@ -17,7 +17,7 @@ import numpy as np
 from mbma_tables.common.arguments import FloatArray, number_in
 from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces import artefacts
-from mbma_tables.surfaces.artefacts import Artefact
+from mbma_tables.surfaces.artefacts import SMALLEST, Artefact
 from mbma_tables.surfaces.measurements import MAX_LENGTH, MIN_LENGTH, heights_of, wrapped
 
 DEGREES = {
@@ -38,7 +38,7 @@ DETRENDS = (
     "curvature",
     "mad-curvature",
 )
-MIN_GRID = 32  # points along each side: 16 wavenumbers, the first of which is distorted by a window
+MIN_GRID = SMALLEST  # points along each side: 16 wavenumbers, the first of which is distorted by a window
 FREE_HOLES = 0.05  # share of undefined points that is filled without being requested
 MEDIAN_POINTS = 3  # side of the neighbourhood that an outlier is compared with
 # share of points that set the scale of differences, and where it ends if Gaussian
@@ -528,7 +528,7 @@ def _without_sharp_places(treated: Treated, measured: Any) -> Treated:
         "with dust, lost pixels or images joined at different levels"
     )
     remedy = (
-        f"contact would begin there. {_clean_part(places)}, or measure "
+        f"contact would begin there. {artefacts.clean_part(places)}, or measure "
         "again, with smaller steps where the surface itself is so steep"
     )
     return treated.doubted("sharp places", description, remedy, points=count)
@@ -577,33 +577,12 @@ def _shortest_waves(heights: FloatArray, periodic: bool) -> FloatArray:
     return np.asarray(np.abs(short)[inner, inner])
 
 
-def _clean_part(places: Any) -> str:
-    """A call with half or a quarter of the map without these places, if there is one."""
-    cuts = []
-    for count in places.shape:
-        middle = count // 2
-        cuts.append(
-            (
-                (":", slice(None)),
-                (f":{middle}", slice(middle)),
-                (f"{middle}:", slice(middle, None)),
-            )
-        )
-    for (rows, row), (columns, column) in itertools.product(*cuts):
-        part = places[row, column]
-        if min(part.shape) >= MIN_GRID and not part.any():
-            return (
-                "Cut out a part without them, "
-                f"Surface.from_map(heights[{rows}, {columns}], ...)"
-            )
-    return "Cut out a part without them, Surface.from_map(heights[i:j, k:l], ...)"
-
-
 def _filled(treated: Treated, fill: str | None) -> Treated:
     """Heights without undefined points."""
     heights = treated.heights
     size = heights.size
-    count = int(np.ma.getmaskarray(heights).sum())
+    undefined = np.ma.getmaskarray(heights)
+    count = int(undefined.sum())
     share = count / size
     if count == 0:
         return dataclasses.replace(treated, heights=_harmonic(treated))
@@ -620,8 +599,8 @@ def _filled(treated: Treated, fill: str | None) -> Treated:
     if share > MOST_FILLED and heights.ndim == 2:
         more["not_valid"] = (
             f"{share:.2g} of the points are filled, more than {MOST_FILLED:g}: contact "
-            "and gaps there were not measured. Cut out a part without holes, "
-            "Surface.from_map(heights[i:j, k:l], ...), or measure again"
+            f"and gaps there were not measured. {artefacts.clean_part(undefined)}, or "
+            "measure again"
         )
     return treated.after(
         _harmonic(treated),

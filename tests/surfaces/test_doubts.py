@@ -261,6 +261,63 @@ class TestHighestPlace:
         assert any("confirmed" in str(step) for step in confirmed.provenance)
 
 
+def clipped_corner():
+    values = heights(Part("gaussian", 1, 128)).copy()
+    values[70:76, 80:86] = values.max() + values.std()
+    return values
+
+
+def holed_corner():
+    values = heights(Part("gaussian", 1, 128)).copy()
+    values[70:76, 80:86] = np.nan
+    return values
+
+
+def with_lump():
+    values = heights(Part("gaussian", 1, 128))
+    x, y = np.indices(values.shape) - 90
+    lump = np.exp(-(x**2 + y**2) / 2 / 5.0**2)
+    return finished(values + 6 * values.std() * lump, 8.0)
+
+
+def with_dust():
+    return with_artefact(Part("gaussian", 1, 128), squares(3, 1e-4, 8.0))[0]
+
+
+def with_lost_row():
+    values = heights(Part("gaussian", 1, 128)).copy()
+    values[100] = values[99]
+    return values
+
+
+def in_two_parts():
+    values = heights(Part("gaussian", 1, 128)).copy()
+    values[64:] += values.std()
+    return values
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "name"),
+    [
+        (lambda: with_spikes(0.006)[0], "spikes"),
+        (lambda: bowed(3.0), "a bow has"),
+        (clipped_corner, "exactly the highest value"),
+        (holed_corner, "are filled"),
+        (with_lump, "hang on it alone"),
+        (with_dust, "change within a sampling step"),
+        (with_lost_row, "an instrument lost"),
+        (in_two_parts, "the heights step by"),
+    ],
+)
+def test_each_remedy_can_be_pasted_and_removes_its_reason(spoilt, name):
+    values = spoilt()
+    found = contact(Surface.from_map(values, 1.0), area=0.1, theory="calibrated")
+    assert not found.valid
+    assert any(name in reason for reason in found.reasons)
+    mended = as_read(found.surface, name, values)
+    assert not any(name in doubt for doubt in mended.doubts)
+
+
 @pytest.mark.parametrize("wrong", ["dust", ["bow", 3], 7, "bow,,spikes"])
 def test_only_what_is_known_is_confirmed(wrong):
     with pytest.raises(InputError, match="confirmed must be"):

@@ -69,14 +69,22 @@ def resolved(surface: MeasuredSurface, grid: Grid) -> MeasuredSurface:
     points = steps_along(surface, whole)
     if points >= MIN_POINTS * (1 - ROUNDING) or np.isfinite(whole.waves[1]):
         return surface
-    step = max(whole.steps) * 2 ** halvings_of(whole.heights, grid)
+    each = 2 ** halvings_of(whole.heights, grid)
+    step = max(whole.steps) * each
     # of as many digits as are printed, so that the printed one gives the same answer
     cutoff = float(f"{1.001 * MIN_POINTS * step:.4g}")
     why = (
-        f"chosen for the simulation, whose grid has {MIN_POINTS:g} steps along it: "
+        f"chosen for the simulation, whose grid has {MIN_POINTS:g} steps along it"
+        f"{f' {which_points(each)}' if each > 1 else ''}: "
         f"{cutting(cutoff, surface.unit)} of Surface.from_map sets the instrument's"
     )
     return without_shorter(surface, cutoff, why)
+
+
+def which_points(each: int) -> str:
+    """Which points of a map are simulated, if not all."""
+    ordinal = "second" if each == 2 else f"{each}th"
+    return f"on every {ordinal} point along each side" if each > 1 else ""
 
 
 def halvings_of(heights: FloatArray, grid: Grid) -> int:

@@ -158,6 +158,7 @@ class TestDefaultTheory:
         assert half.valid.all()
         assert half.elastic_theory.pressed.heights.shape == (64, 64)
         assert (f"short_cutoff={cutoff}" in half.surface.resolution) == (cutoff > 0)
+        assert "simulated, on every second point along each side" in repr(half)
         whole = contact(
             half.surface, pressure=half.pressure, theory=Simulated(grid="full")
         )
