@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from mbma_tables.contacts.law.make import contact_law as contact_law
     from mbma_tables.contacts.quantities.interface import Gas as Gas
     from mbma_tables.contacts.resolution import ResolutionStudy as ResolutionStudy
+    from mbma_tables.contacts.resolution import last_octave as last_octave
     from mbma_tables.contacts.resolution import resolution_study as resolution_study
     from mbma_tables.contacts.result import Contact as Contact
     from mbma_tables.contacts.sealing import sealing_pressure as sealing_pressure
@@ -65,6 +66,7 @@ _HOMES = {
     "in_chunks": "mbma_tables.common.chunks",
     "island": "mbma_tables.theories.mbma.island",
     "open_table": "mbma_tables.tables.open",
+    "last_octave": "mbma_tables.contacts.resolution",
     "resolution_study": "mbma_tables.contacts.resolution",
     "rough_contact": "mbma_tables.effects.rough_contact",
     "sealing_pressure": "mbma_tables.contacts.sealing",

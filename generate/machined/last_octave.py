@@ -1,4 +1,4 @@
-"""`python -m generate last_octave`: what `Contact.resolution` states, against accurate simulations.
+"""`python -m generate last_octave`: what `mbma_tables.last_octave` states, against accurate simulations.
 
 Raw maps of all kinds, with seeds that no fit saw, are asked with the defaults; both maps, with and
 without the last octave of wavelengths, are pressed by Tamaas at a tolerance of 1e-7.
@@ -10,6 +10,7 @@ import click
 import numpy as np
 import pandas as pd
 
+import mbma_tables
 from generate.files import ROOT
 from generate.machined import raw_maps
 from mbma_tables import Surface, contact
@@ -31,7 +32,7 @@ def last_octave(out: pathlib.Path) -> None:
         found = contact(surface, area=AREAS)
         if kind in done or not np.all(found.valid):
             continue
-        study = found.resolution()
+        study = mbma_tables.last_octave(found)
         areas = []
         for each in study.contacts:
             simulated = each.surface.map.heights  # type: ignore[attr-defined]

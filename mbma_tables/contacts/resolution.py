@@ -197,7 +197,36 @@ def resolution_study(
 
 
 def last_octave(found: Contact) -> ResolutionStudy:
-    """The study of a simulated contact at its own pressures, and without its last octave of wavelengths."""
+    """What the shortest wavelengths of a map do to a contact, by simulation without the last octave.
+
+    Parameters
+    ----------
+    found : Contact
+        Simulated on its map.
+
+    Returns
+    -------
+    ResolutionStudy
+        At the pressures of this contact, with all wavelengths and without the last octave of
+        them: `statement()` is a line on it, `change("area")` that of ln A.
+
+    Raises
+    ------
+    InputError
+        For a contact that is not simulated on its map.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mbma_tables import Surface, contact, last_octave
+    >>> noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((64, 64)))
+    >>> q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
+    >>> q[0, 0] = np.inf
+    >>> heights = np.fft.irfft2(np.where((q > 0.03) & (q < 0.2), noise * q**-1.8, 0))
+    >>> surface = Surface.from_map(heights, dx=1.0, periodic=True)
+    >>> last_octave(contact(surface, area=0.1)).change("area") < 0
+    array([ True])
+    """
     surface: Any = found.surface
     map_of(surface)
     if found.theory_of(found.bodies).gaps() is None:

@@ -49,7 +49,6 @@ from mbma_tables.theories.hardness import with_hardness
 
 if TYPE_CHECKING:
     from mbma_tables.contacts.quantities.leakage import Leakage
-    from mbma_tables.contacts.resolution import ResolutionStudy
     from mbma_tables.theories.yielding.theory import Loaded
 
 # what yields depends on the heaviest load before: without one none is assumed, also where
@@ -665,36 +664,6 @@ class Contact(State, Displayed):
             fields += [self.leakage.K, self.leakage.scatter]
         label = theory_label(self.theory) + (f", {self.variant}" if self.variant else "")
         return DrawnCurve(label, *(np.ravel(field)[order] for field in fields))
-
-    def resolution(self) -> ResolutionStudy:
-        """What the shortest wavelengths of a map do to this contact, simulated when it is called.
-
-        Returns
-        -------
-        ResolutionStudy
-            At the pressures of this contact, with all wavelengths and without the last octave of
-            them: `statement()` is a line on it, `change("area")` that of ln A.
-
-        Raises
-        ------
-        InputError
-            For a contact that is not simulated on its map.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from mbma_tables import Surface, contact
-        >>> noise = np.fft.rfft2(np.random.default_rng(1).standard_normal((64, 64)))
-        >>> q = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
-        >>> q[0, 0] = np.inf
-        >>> heights = np.fft.irfft2(np.where((q > 0.03) & (q < 0.2), noise * q**-1.8, 0))
-        >>> surface = Surface.from_map(heights, dx=1.0, periodic=True)
-        >>> contact(surface, area=0.1).resolution().change("area") < 0
-        array([ True])
-        """
-        from mbma_tables.contacts.resolution import last_octave
-
-        return last_octave(self)
 
     def map(self) -> ContactMap:
         """Pressure, gap and contact at every point of the surface's map, simulated on its full grid at this pressure.

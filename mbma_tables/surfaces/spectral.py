@@ -471,7 +471,7 @@ class SpectralSurface(AnySurface):
             ", and without the last octave of them the rms gradient would be "
             f"{gradient:.2f} times as large"
             if self.map is None
-            else "; contact(surface, ...).resolution() simulates what the last octave of "
+            else "; last_octave(contact(surface, ...)) simulates what the last octave of "
             "them does to it"
         )
         record = {

@@ -7,7 +7,7 @@ import pytest
 from helpers import run
 
 from generate.machined.makers import Part, heights
-from mbma_tables import InputError, Surface, contact, resolution_study
+from mbma_tables import InputError, Surface, contact, last_octave, resolution_study
 from mbma_tables.theories import Simulated
 
 PRESSURES = ["20 MPa", "200 MPa", "1 GPa"]
@@ -51,15 +51,17 @@ def test_the_statement_of_the_gradient_is_not_that_of_the_area():
 def test_the_surface_names_the_call_that_simulates_it():
     surface = of("worn")
     found = contact(surface, "100 GPa", pressure=PRESSURES)
-    call = re.search(r"contact\(surface, \.\.\.\)(\.resolution\(\))", surface.resolution)
-    study = eval(f"found{call[1]}", {"found": found})
+    call = re.search(r"last_octave\(contact\(surface, \.\.\.\)\)", surface.resolution)
+    names = {"last_octave": last_octave, "contact": contact, "surface": surface}
+    more = "'100 GPa', pressure=pressures"
+    study = eval(call[0].replace("...", more), names | {"pressures": PRESSURES})
     longer = of("worn", short_cutoff=f"{study.cutoff[1]} um")
     coarse = contact(longer, "100 GPa", pressure=PRESSURES, theory=Simulated("full"))
     np.testing.assert_allclose(
         study.change("area"), np.log(found.area / coarse.area), atol=0.05
     )
     with pytest.raises(InputError, match="no simulated gaps"):
-        contact(surface, "100 GPa", pressure=1e-3, theory="calibrated").resolution()
+        last_octave(contact(surface, "100 GPa", pressure=1e-3, theory="calibrated"))
 
 
 def test_what_is_independent_of_the_cutoff():
