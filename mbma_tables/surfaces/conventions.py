@@ -253,14 +253,18 @@ def read_spectra(path: str | os.PathLike[str]) -> list[Spectrum]:
 
     Examples
     --------
+    >>> import pathlib
+    >>> import tempfile
     >>> from mbma_tables.surfaces.conventions import read_spectra
-    >>> path = getfixture("tmp_path") / "psd.txt"
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> path = pathlib.Path(folder.name, "psd.txt")
     >>> rows = "\n".join(f"{q} {q**-3.0}" for q in (1, 2, 4, 8))
     >>> columns = "# Columns: Wavevector (µm⁻¹), PSD (µm³)"
     >>> _ = path.write_text(f"# 1D PSD along x\n# ---\n{columns}\n{rows}\n", "utf-8")
     >>> (spectrum,) = read_spectra(path)
     >>> spectrum.convention, spectrum.unit, spectrum.C.tolist()
     ('C1D', 'um', [1.0, 0.125, 0.015625, 0.001953125])
+    >>> folder.cleanup()
     """
     place = pathlib.Path(path)
     if place.suffix.lower() == ".xlsx":
