@@ -406,6 +406,10 @@ class Dimension:
         """
         return _unit_of(self, units)
 
+    def mechanical_unit(self, length: str, stress: str) -> str:
+        """Its unit by the names of those of length and stress, or of force where that stands for stress."""
+        return _product({stress: self.stress, length: self.length})
+
     def _of_time(self) -> dict[str, int]:
         return {"s": self.time, "K": self.temperature, "A": self.current}
 
@@ -423,7 +427,7 @@ def _unit_of(dimension: Dimension, units: Units) -> str:
         powers = {"m": dimension.length, "Pa": dimension.stress, **dimension._of_time()}
         return NAMED.get(dimension) or _product(powers)
     stress, length = units.stress or "stress", units.length or "length"
-    return _product({stress: dimension.stress, length: dimension.length})
+    return dimension.mechanical_unit(length, stress)
 
 
 def _product(powers: Mapping[str, int]) -> str:

@@ -21,6 +21,7 @@ from mbma_tables.contacts.law.law import ContactLaw
 from mbma_tables.contacts.law.leakage import LeakageLaw
 from mbma_tables.contacts.law.make import law_of
 from mbma_tables.contacts.quantities.conductances import conductance_of_gas
+from mbma_tables.contacts.quantities.declaration import Quantity
 from mbma_tables.contacts.quantities.gas import VACUUM
 from mbma_tables.contacts.quantities.interface import NOTHING_BETWEEN, Gas, Interface
 from mbma_tables.contacts.quantities.stiffnesses import tangential_stiffness
@@ -88,10 +89,11 @@ class ExportedLaw:
     direction: str | float | None = None  # of a simulated map's leakage
     force: ForceLaw | None = None
 
-    @property
-    def units(self) -> Units:
-        """Of length and of stress."""
-        return Units(self.length, self.stress)
+    def unit_of(self, quantity: Quantity) -> str:
+        """The unit of a quantity; where the law is of forces, they stand for stresses."""
+        if self.force is None:
+            return quantity.unit_in(Units(self.length, self.stress))
+        return quantity.dimension.mechanical_unit(self.length, self.stress)
 
     @property
     def ends(self) -> bool:

@@ -207,7 +207,7 @@ def _variables(found: AskedLaw) -> list[dict[str, str]]:
     for name, declared in registry.law_functions().items():
         assert declared.law_function is not None
         meaning = declared.law_function.meaning or declared.meaning
-        outputs[name] = (declared.unit_in(exported.units), meaning)
+        outputs[name] = (exported.unit_of(declared), meaning)
     for name, function in found.functions.items():
         outputs[name] = (function.unit, function.meaning)
     said = "h_max less the mean separation"

@@ -244,7 +244,7 @@ def describe_law(
         number_of = 1.0 if callable(kappa) else kappa
         scale, unit = exported.slope(quantity, kappa=number_of)
     else:
-        unit = in_files()[quantity].unit_in(exported.units)
+        unit = exported.unit_of(in_files()[quantity])
     if friction is not None:
         of_friction, *more_said = _friction(
             exported, friction, kappa, friction_pressure, pressures
