@@ -122,10 +122,10 @@ def clean_part(places: Any) -> str:
         part = places[row, column]
         if min(part.shape) >= SMALLEST and not part.any():
             return (
-                "Cut out a part without them, "
+                "cut out a part without them, "
                 f"Surface.from_map(heights[{rows}, {columns}], ...)"
             )
-    return "No half or quarter of the map is without them: cut out a smaller part"
+    return "cut out a part without them, smaller than a quarter of the map"
 
 
 def _saturation(measured: Any) -> Artefact | None:

@@ -528,7 +528,7 @@ def _without_sharp_places(treated: Treated, measured: Any) -> Treated:
         "with dust, lost pixels or images joined at different levels"
     )
     remedy = (
-        f"contact would begin there. {artefacts.clean_part(places)}, or measure "
+        f"contact would begin there: {artefacts.clean_part(places)}, or measure "
         "again, with smaller steps where the surface itself is so steep"
     )
     return treated.doubted("sharp places", description, remedy, points=count)
@@ -599,7 +599,7 @@ def _filled(treated: Treated, fill: str | None) -> Treated:
     if share > MOST_FILLED and heights.ndim == 2:
         more["not_valid"] = (
             f"{share:.2g} of the points are filled, more than {MOST_FILLED:g}: contact "
-            f"and gaps there were not measured. {artefacts.clean_part(undefined)}, or "
+            f"and gaps there were not measured: {artefacts.clean_part(undefined)}, or "
             "measure again"
         )
     return treated.after(

@@ -115,9 +115,15 @@ def assert_directional_derivatives(path, known):
     model.enterInitializationMode()
     model.exitInitializationMode()
 
+    of_name = {each.name: each.valueReference for each in description.modelVariables}
+    names = ["pressure", "tangent", "area", "energy"]
+    names += ["solid_conductance", "tangential_stiffness", "leakage"]
+    answers = [of_name[name] for name in names]
+    asked = [of_name["overclosure"]]
+
     def slopes(c):
-        model.setReal([1], [c])
-        return list(model.getDirectionalDerivative([2, 3, 4, 5, 6, 7, 8], [1], [2.0]))
+        model.setReal(asked, [c])
+        return list(model.getDirectionalDerivative(answers, asked, [2.0]))
 
     c = known.c[far := (known.c > 1e-3) & (known.c < 0.97 * known.law.h_max)]
     by_p, by_tangent, by_area, by_energy, by_conductance, by_shear, by_leakage = (
