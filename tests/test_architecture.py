@@ -285,3 +285,17 @@ def test_public_names_import_their_modules_when_first_used():
     heavy, loaded = fresh(LAZY)
     assert heavy == []
     assert "mbma_tables.contacts.contact" in loaded
+
+
+FIRST_CONTACT = """
+import json, sys
+from mbma_tables import Surface, contact
+face = Surface(hurst=0.8, q0=0.06, q1=2.0, h_rms=1.0, h_max=3.5)
+contact(face, 1.0, pressure=1e-4).area
+print(json.dumps(sorted({"scipy", "xarray"} & sys.modules.keys())))
+"""
+
+
+def test_a_first_contact_imports_no_large_package():
+    """Of an elastic surface of five numbers; these imports take longer than all else of it."""
+    assert fresh(FIRST_CONTACT) == []

@@ -139,18 +139,18 @@ class Adhesion:
     def work_in(self, units: Units) -> Any:
         """The work in the unit of stresses times that of lengths, an array if it is one."""
         work = _work(self.work, units)
-        if is_labelled(work):
-            return work
-        array = finite_array("work", work)
-        require("work", array, array >= 0, "at least 0")
-        return array[()]
+        return work if is_labelled(work) else _checked_work(work)[()]
 
     def range_in(self, units: Units) -> Any:
         """The range in the unit of lengths, an array if it is one."""
         length = units.number("range", self.range)
-        if is_labelled(length):
-            return length
-        return positive_array("range", length)[()]
+        return length if is_labelled(length) else positive_array("range", length)[()]
+
+
+def _checked_work(work: Any) -> FloatArray:
+    array = finite_array("work", work)
+    require("work", array, array >= 0, "at least 0")
+    return array
 
 
 def _work(given: Any, units: Units) -> Any:
@@ -236,6 +236,14 @@ class AdhesionInUnits:
         if not is_labelled(work) and not np.any(work):
             return None
         return cls(work, length, given.shape, given.traction == EXPONENTIAL)
+
+    def checked(self) -> AdhesionInUnits:
+        """The same, of arrays whose numbers were checked."""
+        return dataclasses.replace(
+            self,
+            work=_checked_work(self.work),
+            range=positive_array("range", self.range),
+        )
 
     @property
     def strength(self) -> FloatArray:

@@ -395,17 +395,12 @@ class BodiesInUnits:
     def checked(self) -> BodiesInUnits:
         """The same bodies, of arrays whose numbers were checked."""
         adhesion = self.adhesion
-        if adhesion is not None:
-            work = finite_array("work", adhesion.work)
-            require("work", work, work >= 0, "at least 0")
-            reach = positive_array("range", adhesion.range)
-            adhesion = dataclasses.replace(adhesion, work=work, range=reach)
         return dataclasses.replace(
             self,
             E_star=positive_array("E_star", self.E_star),
             hardness=checked_hardness(self.hardness),
             largest=None if self.largest is None else checked_largest(self.largest),
-            adhesion=adhesion,
+            adhesion=None if adhesion is None else adhesion.checked(),
         )
 
 

@@ -16,6 +16,7 @@ from mbma_tables.common.arguments import finite_array
 from mbma_tables.common.distributions import distribution_of
 from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.common.progress import echo
+from mbma_tables.contacts.quantities.gas import GASES, VACUUM
 from mbma_tables.contacts.quantities.registry import unit_of
 from mbma_tables.contacts.question import PRESCRIBED
 from mbma_tables.design.specimen import Specimen
@@ -231,7 +232,7 @@ def curve_command(
 @options.conductivity_option
 @click.option(
     "--gas",
-    type=click.Choice(["air", "argon", "helium", "nitrogen", "vacuum"]),
+    type=click.Choice(sorted((*GASES, VACUUM))),
     help="In the gaps: with a conductivity adds gas and total conductance.",
 )
 @options.specimen_options

@@ -252,6 +252,11 @@ def spread(array: Any, shape: tuple[int, ...]) -> Any:
     return array if np.shape(array) == shape else np.broadcast_to(array, shape)
 
 
+def entries_at(array: ArrayLike, shape: tuple[int, ...], place: ArrayLike) -> Any:
+    """Entries of an array, broadcast to a shape, at flat indices, which may be whole floats."""
+    return np.broadcast_to(array, shape).ravel()[np.asarray(place).astype(np.intp)]
+
+
 def rows(*arguments: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
     """The arguments, broadcast and flat, and their shape."""
     shape = np.broadcast(*arguments).shape

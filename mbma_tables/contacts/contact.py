@@ -180,7 +180,8 @@ def _solved(
 ) -> tuple[Solved, Gaps]:
     """The contact of plain arrays at a given quantity, and its separations.
 
-    The numbers of the bodies are checked already.
+    The numbers of the bodies, `bodies.numbers`, are checked already, and given since the
+    caller has made them.
     """
     bodies = setup.bodies
     surface = setup.surface
@@ -193,7 +194,7 @@ def _solved(
     if np.shape(question.value) != shape:
         question = Question(question.name, np.broadcast_to(question.value, shape))
     if modulus.shape != shape:
-        modulus = spread(modulus, shape)
+        modulus = np.broadcast_to(modulus, shape)
     theory = setup.theory_of(bodies)
     gaps = _separations(setup, theory, surface, question, modulus, cap)
     return theory.solved(surface, gaps, modulus), gaps

@@ -14,7 +14,7 @@ from mbma_tables.bodies.bodies import Bodies, after
 from mbma_tables.bodies.materials import ELASTIC_PSI
 from mbma_tables.common.arguments import FloatArray, Numbers, number_in
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.units import Units, factor, in_unit
+from mbma_tables.common.units import factor, in_unit
 from mbma_tables.contacts.contact import contact
 from mbma_tables.contacts.law import block as at
 from mbma_tables.contacts.law.law import ContactLaw
@@ -90,9 +90,8 @@ class ExportedLaw:
     force: ForceLaw | None = None
 
     def unit_of(self, quantity: Quantity) -> str:
-        """The unit of a quantity; where the law is of forces, they stand for stresses."""
-        if self.force is None:
-            return quantity.unit_in(Units(self.length, self.stress))
+        """The unit of a quantity of lengths and stresses; forces stand for stresses where the law is of them."""
+        assert quantity.dimension.is_mechanical
         return quantity.dimension.mechanical_unit(self.length, self.stress)
 
     @property

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.common.arguments import broadcast_shape, is_labelled
+from mbma_tables.common.arguments import broadcast_shape, entries_at, is_labelled
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_line
@@ -68,6 +68,8 @@ class AnySurface(Displayed, abc.ABC):
     m4: Any
     unit: str | None  # of length; None if not known
     provenance: tuple[Mapping[str, Any], ...]  # origin, a plain record for each step
+    #: several scans of it, or surfaces that differ from it by a sampling error
+    scans: tuple[Any, ...] = ()
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -108,7 +110,7 @@ class AnySurface(Displayed, abc.ABC):
         What a theory prepared for the batch then serves for its entries.
         """
         number = np.arange(math.prod(batch.shape)).reshape(batch.shape)
-        rows = np.broadcast_to(number, shape).ravel()[place]
+        rows = entries_at(number, shape, place)
         whole, of_whole = batch.origin
         vars(self)["origin"] = whole, rows if of_whole is None else of_whole[rows]
         return self

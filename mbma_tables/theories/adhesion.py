@@ -18,10 +18,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize.elementwise import find_minimum, find_root
 
 from mbma_tables.bodies.adhesion import AdhesionInUnits
-from mbma_tables.common.arguments import FloatArray, describe_entries
+from mbma_tables.common.arguments import FloatArray, describe_entries, entries_at
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import gap_law
@@ -116,9 +115,8 @@ class Adhesive(Theory):
     def at(self, shape: tuple[int, ...], place: Indices) -> Theory:
         if self._shape == ():
             return self
-        flat = np.asarray(place).astype(np.intp)
         modulus, work, reach = (
-            np.broadcast_to(number, shape).ravel()[flat]
+            entries_at(number, shape, place)
             for number in (self.modulus, self.adhesion.work, self.adhesion.range)
         )
         adhesion = dataclasses.replace(self.adhesion, work=work, range=reach)
@@ -193,6 +191,9 @@ class Adhesive(Theory):
 
         It is the largest tension of the contact as its gap grows.
         """
+        # scipy's optimizers take as long to import as a first contact takes without them
+        from scipy.optimize.elementwise import find_minimum
+
         u, net = self._looked_at(surface)
         # twice, as the first look reaches over many decades
         low, _, high = _beside_lowest(u, net)
@@ -298,6 +299,8 @@ class Adhesive(Theory):
         self, surface: AnySurface, goal: FloatArray, low: FloatArray, high: FloatArray
     ) -> FloatArray:
         """Mean gap at a net pressure, between logarithms of gaps."""
+        from scipy.optimize.elementwise import find_root
+
         net_at, place = self._of_entries(surface, goal.shape)
 
         def missed(log_u: FloatArray, wanted: FloatArray, at: FloatArray) -> FloatArray:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from mbma_tables.common.arguments import (
     FloatArray,
     describe_entries,
+    entries_at,
     require,
     rows,
     spread,
@@ -214,7 +215,7 @@ class Theory(abc.ABC):
         Or why it differs from the surfaces that were tested.
         """
         found = surface.departures()
-        return (*found, UNSAMPLED) if getattr(surface, "scans", ()) else found
+        return (*found, UNSAMPLED) if surface.scans else found
 
     def scatter_name(self, surface: AnySurface) -> str:
         """Name under which its scatter against boundary elements is stored."""
@@ -553,10 +554,7 @@ def select(surface: AnySurface, shape: tuple[int, ...], place: Indices) -> AnySu
     if surface.shape == ():
         return surface
     chosen = np.asarray(place).astype(np.intp)
-    numbers = [
-        np.broadcast_to(number, shape).ravel()[chosen]
-        for number in surface.numbers().values()
-    ]
+    numbers = [entries_at(number, shape, chosen) for number in surface.numbers().values()]
     return surface.with_numbers(*numbers).taken_from(surface, shape, chosen)
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mbma_tables.common.arguments import FloatArray, require, spread
+from mbma_tables.common.arguments import FloatArray, entries_at, require, spread
 from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.banded import BandedSurface
@@ -351,7 +351,7 @@ class Calibrated(Theory):
         )
         if rest.size:
             others = select(surface, found.shape, rest)
-            gaps = np.broadcast_to(u, found.shape).ravel()[rest]
+            gaps = entries_at(u, found.shape, rest)
             found.ravel()[rest] = super().energy(others, gaps)
         return found
 
@@ -412,7 +412,7 @@ class Calibrated(Theory):
             stated = super().scatter(surface, quantity, area)
             doublings = tested.beyond_all(surface)
             wide = np.hypot(stated, WIDE_SCATTER.get(quantity, 0.0) * doublings**0.5)
-            if not getattr(surface, "scans", ()) or np.isnan(wide).all():
+            if not surface.scans or np.isnan(wide).all():
                 return np.asarray(wide)
             assert isinstance(surface, MeasuredSurface)
             return np.asarray(np.hypot(wide, _spread(surface, quantity, area)))

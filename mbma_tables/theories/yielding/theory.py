@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray, entries_at
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.shared import shared
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -183,10 +183,7 @@ class Yielding(Theory):
     def at(self, shape: tuple[int, ...], place: Any) -> Theory:
         if self.hardness.ndim == 0:
             return self
-        chosen = np.broadcast_to(self.hardness, shape).ravel()[
-            np.asarray(place).astype(np.intp)
-        ]
-        return type(self)(self.elastic, chosen)
+        return type(self)(self.elastic, entries_at(self.hardness, shape, place))
 
     def _eta(self, surface: AnySurface) -> FloatArray:
         """p_m/(E* g)."""

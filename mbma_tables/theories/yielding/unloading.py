@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize.elementwise import find_root
 from scipy.special import beta, betainc
 
-from mbma_tables.common.arguments import FloatArray, require, rows
+from mbma_tables.common.arguments import FloatArray, entries_at, require, rows
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import inversion
@@ -185,7 +185,7 @@ class Peak(NamedTuple):
             if isinstance(value, tuple):
                 parts = [chosen(part) for part in value]
                 return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
-            return np.broadcast_to(value, shape).ravel()[place]
+            return entries_at(value, shape, place)
 
         return Peak(*map(chosen, self))
 
