@@ -242,6 +242,6 @@ def draw_residual(axes: Axes) -> None:
         engine.residual_heights()[row],
         label=f"after {2 * SHARES_OF_HARDNESS[0]:g} of the hardness",
     )
-    axes.set_xlabel("place")
+    axes.set_xlabel("place [points]")
     axes.set_ylabel("height [h_rms]")
     axes.legend()
