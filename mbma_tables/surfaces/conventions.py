@@ -60,7 +60,7 @@ ERROR = "standard error"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Spectrum:
+class MeasuredSpectrum:
     """A spectrum of a file, or an average.
 
     Attributes
@@ -87,7 +87,7 @@ class Spectrum:
     error: FloatArray | None = None
     left_out: int = 0
 
-    def to(self, convention: str) -> Spectrum:
+    def to(self, convention: str) -> MeasuredSpectrum:
         """The same spectrum by another convention; see `converted`."""
         C = converted(self.q, self.C, self.convention, convention)
         return dataclasses.replace(self, C=C, convention=convention, error=None)
@@ -170,20 +170,20 @@ def of_traces(q: FloatArray, C: FloatArray) -> FloatArray:
 
 
 def average_spectra(
-    spectra: Sequence[Spectrum], lengths: ArrayLike | None = None
-) -> Spectrum:
+    spectra: Sequence[MeasuredSpectrum], lengths: ArrayLike | None = None
+) -> MeasuredSpectrum:
     """The mean of spectra of one surface, each by the length of its traces.
 
     Parameters
     ----------
-    spectra : sequence of Spectrum
+    spectra : sequence of MeasuredSpectrum
         Of one convention; in the unit of the first.
     lengths : array_like, optional
         Weights, the lengths of traces; equal by default.
 
     Returns
     -------
-    Spectrum
+    MeasuredSpectrum
         At the wavenumbers of all; where some do not reach, the mean of the others.
 
     Raises
@@ -193,7 +193,7 @@ def average_spectra(
         positive or of another number.
     """
     every = list(spectra)
-    if not every or not all(isinstance(one, Spectrum) for one in every):
+    if not every or not all(isinstance(one, MeasuredSpectrum) for one in every):
         raise InputError("average_spectra takes one or more spectra, of read_spectra")
     weights = (
         np.ones(len(every)) if lengths is None else positive_array("lengths", lengths)
@@ -218,10 +218,10 @@ def average_spectra(
     is_known = total > 0
     C = (weights @ values)[is_known] / total[is_known]
     name = f"mean of {len(same)} spectra"
-    return Spectrum(name, q[is_known], C, first.convention, first.unit)
+    return MeasuredSpectrum(name, q[is_known], C, first.convention, first.unit)
 
 
-def _in_unit(one: Spectrum, unit: str | None) -> Spectrum:
+def _in_unit(one: MeasuredSpectrum, unit: str | None) -> MeasuredSpectrum:
     if one.unit == unit:
         return one
     if unit is None or one.unit is None:
@@ -231,7 +231,7 @@ def _in_unit(one: Spectrum, unit: str | None) -> Spectrum:
     return dataclasses.replace(one, q=one.q / by, C=one.C * by**power, unit=unit)
 
 
-def read_spectra(path: str | os.PathLike[str]) -> list[Spectrum]:
+def read_spectra(path: str | os.PathLike[str]) -> list[MeasuredSpectrum]:
     r"""Spectra in a file of the analysis "Power spectrum" of contact.engineering.
 
     Parameters
@@ -242,7 +242,7 @@ def read_spectra(path: str | os.PathLike[str]) -> list[Spectrum]:
 
     Returns
     -------
-    list of Spectrum
+    list of MeasuredSpectrum
         The series "1D PSD along x" and "along y" are "C1D"; "q/pi x 2D PSD" is divided by
         q/pi and is "isotropic".
 
@@ -356,7 +356,7 @@ def _tables_of_workbook(path: pathlib.Path) -> Iterator[Table]:
 
 def _spectrum(
     subject: str, series: str, columns: str, rows: list[list[str]], file: str
-) -> Spectrum:
+) -> MeasuredSpectrum:
     """A spectrum of the text of its rows."""
     name = ": ".join(filter(None, (subject, series)))
     match = COLUMNS.search(columns)
@@ -387,4 +387,6 @@ def _spectrum(
     error = scale * numbers[is_known, 2] if width == 3 else None
     C = scale * positive_array("C", C)
     left_out = int((~is_known).sum())
-    return Spectrum(name, q, C, convention, known(match[1].strip()), error, left_out)
+    return MeasuredSpectrum(
+        name, q, C, convention, known(match[1].strip()), error, left_out
+    )

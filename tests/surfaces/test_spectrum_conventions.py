@@ -7,7 +7,7 @@ import pytest
 from mbma_tables import Surface, contact
 from mbma_tables.common.errors import InputError, MbmaError
 from mbma_tables.surfaces.conventions import (
-    Spectrum,
+    MeasuredSpectrum,
     average_spectra,
     converted,
     read_spectra,
@@ -89,19 +89,19 @@ def test_a_surface_of_a_spectrum_of_traces():
 
 def test_averages_weigh_by_length():
     q = np.geomspace(1.0, 10.0, 11)
-    one = Spectrum("one", q, q**-3.0, "C1D", "um")
-    other = Spectrum("other", q[5:], 4 * q[5:] ** -3.0, "C1D", "um")
+    one = MeasuredSpectrum("one", q, q**-3.0, "C1D", "um")
+    other = MeasuredSpectrum("other", q[5:], 4 * q[5:] ** -3.0, "C1D", "um")
     mean = average_spectra([one, other], [1.0, 2.0])
     np.testing.assert_allclose(mean.C, np.where(q >= q[5], 3.0, 1.0) * q**-3.0)
     assert (mean.convention, mean.unit) == ("C1D", "um")
-    in_mm = Spectrum("mm", 1e3 * q, 1e-9 * q**-3.0, "C1D", "mm")
+    in_mm = MeasuredSpectrum("mm", 1e3 * q, 1e-9 * q**-3.0, "C1D", "mm")
     np.testing.assert_allclose(average_spectra([one, in_mm]).C, one.C)
     for wrong, lengths, message in (
         ([], None, "one or more spectra"),
         ([one, one], [1.0], "2 numbers"),
         ([one, one], [1.0, 0.0], "lengths must be positive"),
         ([one, one.to("C1D+")], None, "conventions C1D, C1D"),
-        ([one, Spectrum("bare", q, q, "C1D")], None, "some spectra have a unit"),
+        ([one, MeasuredSpectrum("bare", q, q, "C1D")], None, "some spectra have a unit"),
     ):
         with pytest.raises(InputError, match=message):
             average_spectra(wrong, lengths)
