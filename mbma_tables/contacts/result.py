@@ -42,7 +42,11 @@ from mbma_tables.contacts.quantities.validity import (
 )
 from mbma_tables.contacts.question import GAPS, both_separations
 from mbma_tables.surfaces.any_surface import AnySurface, apply_to_surface
-from mbma_tables.surfaces.surface import MeasuredSurface, assumptions
+from mbma_tables.surfaces.surface import (
+    MeasuredSurface,
+    assumptions,
+    is_assumed_gaussian,
+)
 from mbma_tables.theories.adhesion import with_adhesion
 from mbma_tables.theories.base import Theory, TheoryAnswer
 from mbma_tables.theories.hardness import with_hardness
@@ -558,6 +562,8 @@ class Contact(State, Displayed):
             facts["loading"] = self.loading
         for name in names:
             facts[name] = self._shown(name)
+        if np.any(self.valid) and is_assumed_gaussian(self.surface):
+            facts["valid"] += ", if the face is Gaussian and isotropic"
         return facts
 
     @property

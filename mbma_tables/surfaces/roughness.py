@@ -35,6 +35,7 @@ WAVES = ("longest", "shortest")
 TOPS = ("h_max", "Sp", "nominal_area")
 ROUGHNESS = (*HEIGHTS, *SLOPES, *WAVES, "rolloff", *TOPS[1:], "process")
 UNKNOWN = "unknown"  # a process that is not named
+GAUSSIAN = "gaussian"  # the process of a face that is known to be Gaussian and isotropic
 ASSUMED = (
     "heights are Gaussian and the surface is isotropic: measure a map of a ground, milled "
     "or worn face"
@@ -155,6 +156,10 @@ def record_of_process(process: Any) -> dict[str, str]:
     return record
 
 
+def _assumed_of(process: Any) -> list[str]:
+    return [] if process == GAUSSIAN else [ASSUMED]
+
+
 def surface_of_roughness(
     unit: str | None, numbers: Mapping[str, Any], process: Any = None
 ) -> dict[str, Any]:
@@ -196,7 +201,7 @@ def surface_of_roughness(
         "step": "from_roughness",
         "given": {name: _plain(stated[name]) for name in used},
         "unit": unit,
-        "assumed": [ASSUMED, *(SAID[name] for name in used)],
+        "assumed": [*_assumed_of(process), *(SAID[name] for name in used)],
         **of_process,
     }
     surface: dict[str, Any] = {
@@ -218,7 +223,7 @@ def record_of_labels(
     return {
         "step": "from_roughness",
         "unit": unit,
-        "assumed": [ASSUMED, *(SAID[name] for name in names)],
+        "assumed": [*_assumed_of(process), *(SAID[name] for name in names)],
         **record_of_process(process),
     }
 

@@ -18,7 +18,7 @@ from mbma_tables.common.arguments import (
 )
 from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces.heights import Heights
-from mbma_tables.surfaces.roughness import ASSUMED
+from mbma_tables.surfaces.roughness import ASSUMED, GAUSSIAN
 from mbma_tables.surfaces.self_affine import SelfAffine
 from mbma_tables.surfaces.spectral import SpectralSurface
 from mbma_tables.surfaces.treatment import OPTIONS
@@ -424,9 +424,24 @@ def _of_paper(q: Any, C: Any, convention: str | None) -> tuple[Any, FloatArray]:
 def assumptions(surface: Any) -> list[str]:
     """What a surface and the faces that it combines assume, each line once."""
     lines = dict.fromkeys(_assumed(surface.provenance))
-    if isinstance(surface, Surface) and ASSUMED not in lines:
+    known = _is_known_gaussian(surface.provenance)
+    if isinstance(surface, Surface) and not known and ASSUMED not in lines:
         return [ASSUMED, *lines]
     return list(lines)
+
+
+def is_assumed_gaussian(surface: Any) -> bool:
+    """Whether nothing is known of a face but numbers, which the Gaussian and isotropic ones share with others."""
+    return ASSUMED in assumptions(surface)
+
+
+def _is_known_gaussian(provenance: Iterable[Mapping[str, Any]]) -> bool:
+    """Whether the records of a face, or of each face that was combined, name the process "gaussian"."""
+    return any(
+        record.get("process") == GAUSSIAN
+        or ("of" in record and all(map(_is_known_gaussian, record["of"])))
+        for record in provenance
+    )
 
 
 def _assumed(provenance: Iterable[Mapping[str, Any]]) -> Iterator[str]:

@@ -739,3 +739,28 @@ def test_theories_whose_answers_are_none_are_named(theory, asked):
         _ = contact(SURFACE, **{asked: [0.01, 0.02]}, theory=theory).stiffness
     with pytest.raises(InputError, match=f"theory '{theory.name}'.* must answer"):
         contact_law(SURFACE, theory=theory)
+
+
+@pytest.mark.parametrize(
+    ("process", "shown"),
+    [
+        (None, "valid True, if the face is Gaussian and isotropic)"),
+        ("gaussian", "valid True)"),
+        ("milled", "valid False)"),
+    ],
+)
+def test_what_numbers_leave_open_is_a_condition_of_validity(process, shown):
+    # faces of many kinds have the same Ra and wavelengths
+    face = Surface.from_roughness(
+        hurst=0.8,
+        Ra="0.4 um",
+        longest="0.25 mm",
+        shortest="5 um",
+        h_max="1.7 um",
+        process=process,
+    )
+    found = contact(face, Bodies("100 GPa"), pressure="100 MPa")
+    assert repr(found).endswith(shown)
+    # a difference of two such faces leaves the same open
+    combined = face.combined(face)
+    assert repr(contact(combined, Bodies("100 GPa"), pressure="100 MPa")).endswith(shown)
