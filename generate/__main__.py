@@ -48,6 +48,7 @@ PAGES = {
     "readme": "pages.library:readme",
     "tables": "pages.library:tables",
     "theories": "pages.library:theories",
+    "howto/trust": "pages.trust:measure",
     "calibrated": "pages.laws:calibrated",
     "leakage": "pages.laws:leakage",
     "adhesion": "pages.adhesion:adhesion",
