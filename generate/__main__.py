@@ -23,6 +23,7 @@ COMMANDS = {
     ),
     **dict.fromkeys(("film", "tangential"), "generate.machined.studies"),
     "adhesion": "generate.adhesion",
+    "archive": "generate.archive",
     "artefacts": "generate.machined.artefacts",
     "drawing": "generate.drawing",
     "edges": "generate.machined.edges",

@@ -17,6 +17,7 @@ from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
 from generate import distances
+from generate.archive import FILES
 from generate.boundary_elements.run import LIGHT_BINS, compared, surfaces
 from generate.calibrated_file import QUANTITIES, binned, by_bin
 from generate.files import ROOT, dataset
@@ -640,8 +641,17 @@ def data() -> Measured:
         group = node.to_dataset()
         contacts = int(np.isfinite(group.area).sum())
         rows.append([f"`{name}`", group.attrs["title"], _surfaces_of(group), contacts])
-    text = table("group | content | surfaces | contacts", rows)
-    return {"groups": text}, {"docs/figures/data.svg": draw_data(tree)}
+    files = [
+        [f"`{name}`", content, f"`{command}`" if command else "-"]
+        for name, (content, command) in FILES.items()
+    ]
+    parts = {
+        "groups": table("group | content | surfaces | contacts", rows),
+        "files": table(
+            "file of docs/data | content | made by `python -m generate`", files
+        ),
+    }
+    return parts, {"docs/figures/data.svg": draw_data(tree)}
 
 
 def _surfaces_of(group: xr.Dataset) -> int:
