@@ -66,7 +66,7 @@ PAGES = {
     "lubrication": "pages.simulations:lubrication",
     "rough_bodies": "pages.simulations:rough_bodies",
     "cost": "pages.cost:measure",
-    "stability": "pages.stability:measure",
+    "guarantees": "pages.stability:measure",
     "explorer": "explorer:measure",
     # `yield` is a word of the language
     "yield": "pages.laws:yielding",

@@ -35,14 +35,16 @@ MARKED = re.compile(r"(<!-- measured: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def fill(text: str, parts: Mapping[str, str]) -> str:
-    """Replace the marked blocks of a page; marks and parts must have the same names."""
+    """Replace the marked blocks of a page that were measured; another program writes the others."""
     marked = [match[2] for match in MARKED.finditer(text)]
-    if sorted(marked) != sorted(parts):
+    if not set(parts) <= set(marked):
         raise click.ClickException(
             f"the page marks {sorted(marked)}, measured were {sorted(parts)}"
         )
 
     def filled(match: re.Match[str]) -> str:
+        if match[2] not in parts:
+            return match[0]
         return f"{match[1]}\n{parts[match[2]]}\n\n{match[3]}"
 
     return MARKED.sub(filled, text)

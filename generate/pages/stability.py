@@ -1,4 +1,4 @@
-"""docs/stability.md: corners of parameter space, counted and drawn.
+"""Hard cases of docs/guarantees.md: corners of parameter space, counted and drawn.
 
 The reference is mpmath at 40 digits or more where a closed form exists, else the exact
 solver at a tighter tolerance.

@@ -595,7 +595,7 @@ def test_islands_are_of_plain_arrays():
 
 
 class Careful(Theory):
-    """As docs/howto/own_theory.md describes a class: `reasons` states why results are not valid."""
+    """As docs/theories.md describes a class: `reasons` states why results are not valid."""
 
     name = "careful"
 
