@@ -1,5 +1,6 @@
 """A law as an FMU: checked, built and simulated by FMPy."""
 
+import dataclasses
 import importlib.util
 import io
 import re
@@ -12,6 +13,8 @@ from law_points import ASKED, CONDUCTIVITY, KAPPA, needs, points
 
 from mbma_tables import InputError
 from mbma_tables.contacts.quantities import registry
+from mbma_tables.contacts.quantities.declaration import LawFunction
+from mbma_tables.export.code import law_code
 from mbma_tables.export.code.fmu import fmu
 
 HEAT = {"conductivity": CONDUCTIVITY, "conductivity_unit": "mW/(mm K)"}
@@ -251,6 +254,24 @@ def test_an_fmu_runs_as_it_is(tmp_path):
     if folder == "linux64":
         assert_oldest_glibc(zipfile.ZipFile(io.BytesIO(file)), said)
     assert made("mbma", binaries="here", leakage=True) == file
+
+
+@needs("cc")
+def test_an_fmu_has_every_function_that_laws_are_declared_to_have(tmp_path, monkeypatch):
+    """Its C had a case for each of four."""
+    fmpy = pytest.importorskip("fmpy")
+    of_slope = dataclasses.replace(
+        registry.get("area"), law_function=LawFunction("area_slope", "MBMA_AREA_SLOPE")
+    )
+    declared = registry.law_functions() | {"area_slope": of_slope}
+    for module in (registry, law_code):
+        monkeypatch.setattr(module, "law_functions", lambda: declared)
+    (tmp_path / "road.fmu").write_bytes(made("mbma", binaries="here"))
+    given = {"start_values": {"overclosure": 0.5}, "output": ["area_slope"]}
+    found = fmpy.simulate_fmu(str(tmp_path / "road.fmu"), stop_time=1.0, **given)[-1]
+    law = points("mbma").law
+    known = law.area(2.5 - 1e-5) - law.area(2.5 + 1e-5)
+    assert found["area_slope"] == pytest.approx(float(known) / 4e-5, rel=1e-6)
 
 
 @needs("cc")

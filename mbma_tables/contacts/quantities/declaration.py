@@ -39,6 +39,7 @@ class LawFunction(NamedTuple):
     """The function of a quantity that every law as code has."""
 
     name: str
+    core: str  # of the `mbma_quantity` of core/mbma.h that it is
     meaning: str = ""  # along loading; that of the quantity where it is empty
 
 

@@ -29,7 +29,7 @@ def _in_shape(contact: State, value: Any) -> Any:
     error_sign=0,
     against="overclosure",
     follows="pressure",
-    law_function=LawFunction("pressure"),
+    law_function=LawFunction("pressure", "MBMA_FORCE"),
     similarity=(0, 0),
 )
 def pressure(contact: State) -> Any:
@@ -41,7 +41,7 @@ def pressure(contact: State) -> Any:
     DIMENSIONLESS,
     "real over nominal contact area",
     uncertainty="area_scatter",
-    law_function=LawFunction("area"),
+    law_function=LawFunction("area", "MBMA_AREA"),
     similarity=(0, 0),
 )
 def area(contact: State) -> Any:

@@ -40,7 +40,9 @@ POISSONS_RATIO = Need(
     STIFFNESS,
     "-dF/du per nominal area, of first loading",
     uncertainty="stiffness_scatter",
-    law_function=LawFunction("tangent", "derivative of pressure by overclosure"),
+    law_function=LawFunction(
+        "tangent", "MBMA_STIFFNESS", "derivative of pressure by overclosure"
+    ),
     similarity=(-1, 0),
 )
 def stiffness(contact: State) -> Any:
@@ -93,7 +95,9 @@ def tangential_stiffness(contact: State) -> Any:
     needs=(NO_ADHESION,),
     is_column=False,
     is_listed=of_elastic_contacts,
-    law_function=LawFunction("energy", "integral of pressure over overclosure"),
+    law_function=LawFunction(
+        "energy", "MBMA_ENERGY", "integral of pressure over overclosure"
+    ),
     similarity=(1, 0),
 )
 def energy(contact: State) -> Any:

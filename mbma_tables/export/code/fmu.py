@@ -112,6 +112,7 @@ def fmu(
         "NAME": name,
         "TOKEN": token,
         "START": variables[1]["start"],
+        "of_laws": [each.law_function for each in registry.law_functions().values()],
         "functions": list(found.functions),
         "references": [variable["name"] for variable in variables],
         "LEAST": number(exported.c_least, infinity="INFINITY"),

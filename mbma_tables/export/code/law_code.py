@@ -16,7 +16,7 @@ from mbma_tables.common.arguments import one_number
 from mbma_tables.common.errors import InputError
 from mbma_tables.contacts.law.law import ContactLaw
 from mbma_tables.contacts.quantities.gas import VACUUM
-from mbma_tables.contacts.quantities.registry import registry
+from mbma_tables.contacts.quantities.registry import law_functions, registry
 from mbma_tables.contacts.quantities.tangential import checked_friction
 from mbma_tables.effects.force_law import ForceLaw
 from mbma_tables.export.code.functions import Functions
@@ -263,6 +263,7 @@ def text_of(target: str, asked: AskedLaw, file: Beside | None = None) -> str:
         "laws": list(asked.laws),
         "law": pieces["law"]["plain"],
         "pieces": pieces,
+        "of_laws": [each.law_function for each in law_functions().values()],
         "functions": functions,
         "conductance": conductance,
         "friction": "" if asked.friction is None else language.number(asked.friction),

@@ -19,6 +19,18 @@ MBMA_INLINE double mbma_curvature(const mbma_law *law, double c) {
     return mbma_law_at_overclosure(law, MBMA_CURVATURE, c > 0.0 && c < 2.3e-308 ? 2.3e-308 : c);
 }
 
+/* A quantity of the law itself and its derivative by c, which is NaN where a law has none. */
+MBMA_INLINE double mbma_quantity_at(const mbma_law *law, mbma_quantity what, double c, double *by_c) {
+    if (what == MBMA_FORCE || what == MBMA_AREA)
+        return mbma_law_and_slope(law, what, c, by_c);
+    *by_c = (double)NAN;
+    if (what == MBMA_ENERGY)
+        *by_c = mbma_law_at_overclosure(law, MBMA_FORCE, c);
+    if (what == MBMA_STIFFNESS)
+        *by_c = mbma_curvature(law, c);
+    return mbma_law_at_overclosure(law, what, c);
+}
+
 MBMA_INLINE double mbma_curve_at(const mbma_function *of, double h_max, double c, double *by_c) {
     const double u = h_max - c;
     if (of->h_rms > 0.0) {
