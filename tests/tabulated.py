@@ -134,6 +134,16 @@ def softer(x, y):
     return np.exp(x * y / 6) * x**1.4, np.sin(x) * y
 
 
+def bumped(x, y):
+    """A third variant, with a bump in one place."""
+    return np.exp(x * y / 5 + 0.1 / (1 + 50 * (y - 0.6) ** 2)) * x, np.sin(x) * y
+
+
+def waved(x, y):
+    """A fourth variant, with a bump in one place of the other axis."""
+    return np.exp(x * y / 5 + 0.1 / (1 + 50 * (np.log(x) - 1) ** 2)) * x, np.sin(x) * y
+
+
 def half_of_persson(hurst, zeta_1, gap):
     """Totals of a theory with half of the pressure and area of Persson's."""
     from mbma_tables.theories.totals import totals_of

@@ -19,6 +19,7 @@ from mbma_tables.common.workers import part_of
 from mbma_tables.tables.function_table import KIND as FUNCTION
 from mbma_tables.tables.function_table import REMEDY as OF_FUNCTIONS
 from mbma_tables.tables.function_table import FunctionTable
+from mbma_tables.tables.members import RULES
 from mbma_tables.tables.reader import read_any
 from mbma_tables.tables.schema import KINDS
 
@@ -254,9 +255,26 @@ def export_command(
 
 @tables_group.command("merge")
 @click.argument("out", type=click.Path(path_type=Path))
-@click.argument("folders", nargs=-1, type=click.Path(path_type=Path))
-def merge_command(out: Path, folders: tuple[Path, ...]) -> None:
-    """Make the table OUT of pieces that were made in parts, in FOLDERS (default: OUT.pieces).
+@click.argument("parts", nargs=-1, type=click.Path(path_type=Path))
+@click.option(
+    "--members",
+    "rule",
+    type=click.Choice([*RULES]),
+    help="PARTS are tables, and members of OUT by this rule.",
+)
+@click.option(
+    "--name",
+    "names",
+    multiple=True,
+    help="Of a member, once for each; default: those of their functions.",
+)
+def merge_command(
+    out: Path, parts: tuple[Path, ...], rule: str | None, names: tuple[str, ...]
+) -> None:
+    """Make the table OUT of pieces that were made in parts, in the folders PARTS (default: OUT.pieces).
+
+    With --members PARTS are tables of functions with the same axes and outputs, and become
+    members of one table.
 
     Example: mbma tables merge mine.nc
     """
@@ -264,7 +282,20 @@ def merge_command(out: Path, folders: tuple[Path, ...]) -> None:
     from mbma_tables.tables.make import check_place
 
     check_place(out)
-    table = make_function.merge(out, list(folders) or [make_function.folder_of(out)])
+    if rule is not None:
+        from mbma_tables.tables.merged_members import merge_members
+
+        echo(f"{out}: {merge_members(out, parts, rule, names)!r}")
+        return
+    if names:
+        raise InputError("--name is of members: --members says by which rule")
+    folders = list(parts) or [make_function.folder_of(out)]
+    files = [folder for folder in folders if folder.is_file()]
+    if files:
+        raise InputError(
+            f"{files[0]} is a file: pieces are in folders; --members merges tables as members"
+        )
+    table = make_function.merge(out, folders)
     echo(f"{out}: {table!r}")
 
 

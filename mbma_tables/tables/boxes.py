@@ -171,6 +171,20 @@ def middle_of(boxes: list[Box], box: Box) -> float:
     return float(boxes[box.child].high[box.axis]) if box.axis >= 0 else 0.0
 
 
+def cells_at(boxes: list[Box], points: FloatArray) -> NDArray[np.int64]:
+    """Numbers of the boxes of points that are not halved; the first box is the whole range."""
+    axis = np.array([box.axis for box in boxes])
+    child = np.array([box.child for box in boxes])
+    middles = np.array([middle_of(boxes, box) for box in boxes])
+    found = np.zeros(len(points), dtype=np.int64)
+    going = np.arange(len(points))
+    while going.size:
+        going = going[axis[found[going]] >= 0]
+        box = found[going]
+        found[going] = child[box] + (points[going, axis[box]] >= middles[box])
+    return found
+
+
 class Piece:
     """A part of the range that grows on its own.
 
@@ -341,22 +355,9 @@ class Piece:
         box.axis, box.child = axis, len(self.boxes)
         self.boxes += box.halves(axis, terms)
 
-    def cells_at(self, points: FloatArray) -> NDArray[np.int64]:
-        """Numbers of the boxes of points that are not halved."""
-        axis = np.array([box.axis for box in self.boxes])
-        child = np.array([box.child for box in self.boxes])
-        middles = np.array([middle_of(self.boxes, box) for box in self.boxes])
-        found = np.zeros(len(points), dtype=np.int64)
-        going = np.arange(len(points))
-        while going.size:
-            going = going[axis[found[going]] >= 0]
-            box = found[going]
-            found[going] = child[box] + (points[going, axis[box]] >= middles[box])
-        return found
-
     def _check(self, points: FloatArray, stored: FloatArray) -> None:
         """Errors at held-out points; boxes that miss the target are halved."""
-        owners = self.cells_at(points)
+        owners = cells_at(self.boxes, points)
         errors = np.full(stored.shape, np.nan)
         scale = self.aim.scale(stored)
         again = False

@@ -537,7 +537,7 @@ class Kept:
         return np.asarray(state["values"])
 
 
-def _in_x(wanted: Wanted, t: FloatArray) -> FloatArray:
+def in_x(wanted: Wanted, t: FloatArray) -> FloatArray:
     """Points of the axes from their coordinates."""
     columns = [axis.from_grid(t[:, a]) for a, axis in enumerate(wanted.axes)]
     return np.stack(columns, axis=-1)
@@ -555,7 +555,7 @@ def grow(
     values = kept.load(number, piece)
     saved = time.monotonic()
     while not piece.is_done:
-        x = _in_x(wanted, piece.points())
+        x = in_x(wanted, piece.points())
         size = wanted.chunk if wanted.vectorized else 1
         while len(values) < len(x):
             ahead = size * run.size() * JOBS_AHEAD
@@ -572,7 +572,7 @@ def grow(
         try:
             piece.take(values)
         except UnsmoothError as fault:
-            place = _in_x(wanted, fault.place[None])[0]
+            place = in_x(wanted, fault.place[None])[0]
             raise UncertifiedError(
                 f"{wanted.function} is not smooth at {_at(wanted, place)}: the target of "
                 f"{wanted.target:g} is not reached in boxes of 2^-{MOST_HALVINGS} of the range; ask for a "
@@ -595,6 +595,37 @@ def table_of(wanted: Wanted, pieces: list[Piece]) -> FunctionTable:
         moved = [dataclasses.replace(b, child=b.child + shift) for b in piece.boxes]
         boxes[place] = moved[0]
         boxes += moved[1:]
+    replayed = zip(*(piece.replayed for piece in pieces), strict=True)
+    points, values = (np.concatenate(part) for part in replayed)
+    errors = np.concatenate(
+        [piece.errors for piece in pieces if piece.errors is not None]
+    )
+    excess = sum(piece.excess for piece in pieces)
+    return assembled(wanted, boxes, (points, values), errors, excess)
+
+
+def assembled(
+    wanted: Wanted,
+    boxes: list[Box],
+    replayed: tuple[FloatArray, FloatArray],
+    errors: FloatArray,
+    excess: int,
+) -> FunctionTable:
+    """The table of a tree of boxes.
+
+    Parameters
+    ----------
+    wanted : Wanted
+    boxes : list of Box
+        The first is the whole range.
+    replayed : tuple of ndarray, shapes (points, axes), (points, stored outputs)
+        Coordinates that the file keeps, and what is stored there by the function.
+    errors : ndarray, shape (held-out points, stored outputs)
+        As the outputs measure them; NaN where there is no answer.
+    excess : int
+        How many of them are above the bound.
+    """
+    points, values = replayed
     cells = [box for box in boxes if box.axis == POLYNOMIAL]
     branches = np.array([(box.axis, box.child) for box in boxes], dtype=float)
     branches[branches[:, 0] == POLYNOMIAL, 1] = np.arange(len(cells))
@@ -610,11 +641,9 @@ def table_of(wanted: Wanted, pieces: list[Piece]) -> FunctionTable:
         "coefficients": np.concatenate([each[:outputs].ravel() for each in series]),
         "errors": bounds[:, :outputs],
     }
-    replayed = zip(*(piece.replayed for piece in pieces), strict=True)
-    points, values = (np.concatenate(part) for part in replayed)
     logs = wanted.aim.is_exponential
     exact = np.where(logs, np.exp(np.where(logs, values, 0.0)), values)
-    arrays["conformance_x"] = _in_x(wanted, points)
+    arrays["conformance_x"] = in_x(wanted, points)
     arrays["conformance_exact"] = exact[:, :outputs]
     if wanted.members is not None:
         arrays |= {
@@ -624,10 +653,7 @@ def table_of(wanted: Wanted, pieces: list[Piece]) -> FunctionTable:
             "member_errors": bounds[:, outputs:],
             "member_exact": exact[:, outputs:],
         }
-    errors = np.concatenate(
-        [piece.errors for piece in pieces if piece.errors is not None]
-    )
-    attributes = _attributes(wanted, errors, sum(piece.excess for piece in pieces))
+    attributes = _attributes(wanted, errors, excess)
     return checked(FunctionTable(wanted.axes, wanted.outputs, arrays, attributes))
 
 
@@ -848,7 +874,7 @@ def merge(path: pathlib.Path, folders: list[pathlib.Path]) -> FunctionTable:
 def forecast(wanted: Wanted) -> str:
     """What a first round of a table asks of the function, and how long one call takes here."""
     piece = pieces_of(wanted)[0]
-    x = _in_x(wanted, piece.points())
+    x = in_x(wanted, piece.points())
     count = min(len(x), wanted.chunk if wanted.vectorized else 4)
     start = time.perf_counter()
     values_of(wanted, x[:count])
@@ -880,7 +906,7 @@ def verified_errors(
     draws = np.random.default_rng(seed)
     for start in range(0, count, ERROR_BLOCK):
         size = min(ERROR_BLOCK, count - start)
-        x = _in_x(wanted, low + (high - low) * draws.random((size, low.size)))
+        x = in_x(wanted, low + (high - low) * draws.random((size, low.size)))
         exact = values_of(wanted, x)[:, : len(table.outputs)]
         found = table.lookup(*x.T)
         rows = [

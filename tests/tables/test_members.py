@@ -12,6 +12,7 @@ from mbma_tables import InputError, TableFileError, open_table
 from mbma_tables.cli import main
 from mbma_tables.tables import make_function
 from mbma_tables.tables.make_function import make, merge, wanted_of
+from mbma_tables.tables.merged_members import merge_members
 
 AXES = {
     "x": {"low": 0.1, "high": 10.0, "transform": "log"},
@@ -194,3 +195,94 @@ def test_a_failing_member_is_named(tmp_path):
     with pytest.raises(InputError, match=r"\(member three\) raised"):
         make(wanted_of(wrong, target=1e-3), tmp_path / "t.nc")
     assert json.loads(wanted_of(wrong).as_json)["members"]["values"] == [1, 2, "three"]
+
+
+VARIANTS = ("smooth", "bumped", "waved")
+LINEAR = {"u": {"unit": "N"}, "v": {"error": "absolute"}}
+
+
+@pytest.fixture(scope="module")
+def variants(tmp_path_factory):
+    """Files of three functions, each with boxes of its own."""
+    folder = tmp_path_factory.mktemp("variants")
+    found = {}
+    for outputs in (OUTPUTS, LINEAR):
+        kind = outputs["u"].get("transform", "linear")
+        for name in VARIANTS:
+            path = folder / f"{name}-{kind}.nc"
+            entry = {"function": f"tabulated:{name}", **BASE, "outputs": outputs}
+            make(wanted_of(entry, target=1e-5), path)
+            found[kind, name] = path
+    return found
+
+
+@pytest.mark.parametrize("kind", ["log", "linear"])
+@pytest.mark.parametrize("rule", ["replicas", "envelope"])
+def test_tables_of_different_boxes_become_members(rule, kind, variants, tmp_path):
+    files = [variants[kind, name] for name in VARIANTS]
+    table = merge_members(tmp_path / "t.nc", files, rule)
+    cells = {open_table(file).arrays["starts"].size for file in files}
+    assert len(cells) == 3
+    assert table.arrays["starts"].size > max(cells)  # none has the boxes of all
+    assert table.members.names == VARIANTS
+    assert table.replayed()[1] <= 1
+    draws = np.random.default_rng(9)
+    x, y = np.exp(draws.uniform(np.log(0.1), np.log(10), 2000)), draws.random(2000)
+    found = table.lookup(x, y, members=True)
+    exact = np.array([getattr(tabulated, name)(x, y) for name in VARIANTS])
+    for k, output in enumerate(("u", "v")):
+        value, low, high = ends_by_hand(rule, [*exact[:, k]]) if rule == "replicas" else (
+            exact[0, k], exact[:, k].min(axis=0), exact[:, k].max(axis=0)
+        )  # fmt: skip
+        spread = found.spread[output]
+        assert (np.abs(found[output] - value) <= found.error[output]).all()
+        assert (np.abs(spread.low - low) <= spread.error).all()
+        assert (np.abs(spread.high - high) <= spread.error).all()
+        size = 1.0 if k else value
+        assert (found.error[output] <= 1e-4 * size).all()
+    for file, name in zip(files, VARIANTS, strict=True):
+        alone = open_table(file).lookup(x, y)
+        member = table.member(name).lookup(x, y)
+        for output in ("u", "v"):
+            np.testing.assert_allclose(
+                member[output], alone[output], rtol=1e-13, atol=1e-13
+            )
+
+
+def test_the_command_merges_members(variants, tmp_path):
+    out = str(tmp_path / "t.nc")
+    files = [str(variants["log", name]) for name in VARIANTS]
+    line = ["tables", "merge", out, *files]
+    named = ["--name", "a", "--name", "b", "--name", "c"]
+    done = CliRunner().invoke(main, [*line, "--members", "hessian", *named])
+    assert done.exit_code == 0, done.output
+    assert "3 members (hessian)" in done.output
+    assert open_table(out).members.names == ("a", "b", "c")
+    verified = CliRunner().invoke(main, ["tables", "verify", out])
+    assert verified.exit_code == 0, verified.output
+    for wrong, message in {
+        (*line,): "--members merges tables",
+        (*line, "--name", "a"): "--name is of members",
+        (*line[:4], "--members", "envelope"): "two tables or more",
+        (*line, out, "--members", "envelope"): "has members itself",
+        (*line[:4], line[3], "--members", "envelope"): "different names",
+        (
+            *line[:4],
+            str(variants["linear", "waved"]),
+            "--members",
+            "envelope",
+        ): "outputs",
+    }.items():
+        refused = CliRunner().invoke(main, wrong)
+        assert refused.exit_code != 0
+        assert message in refused.output
+
+
+def test_members_of_other_axes_are_refused(variants, tmp_path):
+    axes = AXES | {"y": {"low": 0.0, "high": 2.0}}
+    entry = {"function": "tabulated:softer", **BASE, "axes": axes}
+    make(wanted_of(entry, target=1e-3), tmp_path / "wide.nc")
+    files = [variants["log", "smooth"], tmp_path / "wide.nc"]
+    with pytest.raises(InputError, match=r"axes of .*wide.nc differ .* high=2"):
+        merge_members(tmp_path / "t.nc", files, "envelope")
+    assert not (tmp_path / "t.nc").exists()
