@@ -55,6 +55,10 @@ FUNCTIONS = (
     "mbma_yielding_at_gaps",
     "mbma_yielding_areas",
     "mbma_frozen_factors",
+    "mbma_tangential_ratios",
+    "mbma_tangential_stiffnesses",
+    "mbma_solid_conductances",
+    "mbma_covered_areas",
 )
 LAW_FUNCTIONS = (
     "mbma_law_open",

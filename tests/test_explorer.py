@@ -3,6 +3,7 @@
 import csv
 import dataclasses
 import functools
+import json
 import re
 import shutil
 import urllib.parse
@@ -15,6 +16,7 @@ from generate.explorer import c_sources, digest_of, law_sources
 from mbma_tables import Bodies, InputError, Surface, contact
 from mbma_tables.common.units import Units
 from mbma_tables.contacts.quantities import registry
+from mbma_tables.core import core
 from mbma_tables.export.code.languages.javascript import LAW_MODULE
 from mbma_tables.export.page.explorer import MODULE, explorer_page
 from mbma_tables.export.text import page_file
@@ -203,6 +205,62 @@ def test_curves_are_those_of_the_library(number, visit):
             largest_difference(state, columns(tab), slice(rng.integers(9), None, 9))
         )
     assert max(worst) < 1e-9
+
+
+# multiplies what functions of the module write last
+CHANGED = """(factors) => {
+  const instantiate = WebAssembly.instantiate;
+  WebAssembly.instantiate = async (...given) => {
+    const { instance } = await instantiate.apply(WebAssembly, given), exports = { ...instance.exports };
+    for (const [name, factor] of Object.entries(factors)) {
+      exports[name] = (...places) => {
+        const status = instance.exports[name](...places);
+        new Float64Array(exports.memory.buffer, places.at(-1), 1)[0] *= factor;
+        return status;
+      };
+    }
+    return { instance: { exports } };
+  };
+}"""
+
+
+@pytest.mark.slow
+def test_what_the_page_shows_is_computed_by_the_core(visit, opened, address):
+    """Its JavaScript had formulas of its own: with those, a change of the core changed nothing."""
+    state = "theory=mbma&variant=fitted&beside=calibrated"
+    before = columns(visit(state))
+    factors = {
+        "mbma_tangential_ratios": 2,
+        "mbma_tangential_stiffnesses": 8,
+        "mbma_solid_conductances": 16,
+        "mbma_covered_areas": 32,
+    }
+    changed = {"tangential_stiffness": 4.0, "solid_conductance": 16.0, "area": 32.0}
+    context = opened.new_context()
+    context.add_init_script(f"({CHANGED})({json.dumps(factors)})")
+    tab = context.new_page()
+    tab.goto(f"{address}#{state}")
+    tab.wait_for_selector("html[data-ready]", state="attached")
+    after = columns(tab)
+    context.close()
+    for name in (*QUANTITIES, "tangential_stiffness", "solid_conductance"):
+        expected = changed.get(name, 1.0) * before[f"mbma {name}"]
+        np.testing.assert_array_equal(after[f"mbma {name}"], expected)
+
+
+def test_formulas_of_the_core_are_those_of_physics():
+    """(2 - nu)/(2 (1 - nu)) is of Mindlin (1949), k_s/E* times the stiffness of Barber (2003)."""
+    nu = np.array([-0.9, 0.0, 0.3, 0.5])
+    kappa = np.empty(4)
+    core.tangential_ratios(nu, np.full(4, 0.5), kappa)
+    np.testing.assert_allclose(kappa, (2 - nu) / (2 * (1 - nu)), rtol=1e-15)
+    out = np.empty(4)
+    core.tangential_stiffnesses(np.full(4, 3.0), kappa, out)
+    np.testing.assert_allclose(out, 3.0 / kappa, rtol=1e-15)
+    core.solid_conductances(np.full(4, 3.0), np.full(4, 45.0), 10.0 ** np.arange(4), out)
+    np.testing.assert_allclose(out, [135.0, 13.5, 1.35, 0.135], rtol=1e-15)
+    core.covered_areas(np.array([0.0, 1e-12, 0.5, 40.0]), out)
+    np.testing.assert_allclose(out, [0.0, 1e-12, 1 - np.exp(-0.5), 1.0], rtol=1e-11)
 
 
 @pytest.mark.parametrize(

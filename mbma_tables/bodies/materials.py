@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 
 from mbma_tables.common.arguments import (
     FloatArray,
+    answered,
     broadcast_shape,
     finite_array,
     number_in,
@@ -33,6 +34,7 @@ from mbma_tables.common.arguments import (
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import records, shipped_file
 from mbma_tables.common.units import Units, factor, in_one_unit, read
+from mbma_tables.core import core
 
 # plasticity index E* g/p_m up to which elastic areas are within 5% of those with a hardness
 ELASTIC_PSI = 1.1
@@ -622,10 +624,14 @@ def hardness_in(units: Units, value: Any) -> Any:
     return units.number("hardness", hardness(value) if isinstance(value, str) else value)
 
 
+# c of Poisson's ratio in the tangential compliance 1 - nu c of isotropic surfaces
+ISOTROPIC_SHARE = 0.5
+
+
 def tangential_ratio(
     nu: ArrayLike,
     E: Sequence[Any] | None = None,
-    share: Callable[[FloatArray], Any] = lambda nu: 0.5,
+    share: Callable[[FloatArray], Any] = lambda nu: ISOTROPIC_SHARE,
 ) -> Any:
     """kappa, normal over tangential stiffness of a stuck contact (Mindlin 1949).
 
@@ -657,10 +663,10 @@ def tangential_ratio(
         raise InputError(
             "nu is one number, or two with E=(E1, E2), the moduli of the bodies"
         )
+    if E is None:
+        return answered(core.tangential_ratios, (ratio, share(ratio)))[0][()]
     above = 1 - ratio * share(ratio)
     below = 1 - ratio
-    if E is None:
-        return np.asarray(above / below)[()]
     modulus = positive_array(
         "E", list(in_one_unit({"E1": E[0], "E2": E[1]}, kind="stress")[0].values())
     )

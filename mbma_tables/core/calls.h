@@ -165,6 +165,12 @@ static bool do_totals(const argument *a, long long *answer) {
     return true;
 }
 
+static bool do_covered_areas(const argument *a, long long *answer) {
+    enum { SUM, AREA };
+    *answer = (long long)mbma_covered_areas(a[SUM].count, a[SUM].items, a[AREA].items);
+    return true;
+}
+
 static bool do_island_geometry(const argument *a, long long *answer) {
     enum { APPROACH, HURST, ZETA_1, VARIANT, ISLAND };
     if (a[ISLAND].count != WORDS(mbma_island))
@@ -956,6 +962,28 @@ static bool do_frozen_factors(const argument *a, long long *answer) {
     return true;
 }
 
+static bool do_tangential_ratios(const argument *a, long long *answer) {
+    enum { NU, SHARE, KAPPA };
+    *answer = (long long)mbma_tangential_ratios(a[NU].count, a[NU].items, a[SHARE].items,
+                                                a[KAPPA].items);
+    return true;
+}
+
+static bool do_tangential_stiffnesses(const argument *a, long long *answer) {
+    enum { STIFFNESS, KAPPA, TANGENTIAL };
+    *answer = (long long)mbma_tangential_stiffnesses(a[STIFFNESS].count, a[STIFFNESS].items,
+                                                     a[KAPPA].items, a[TANGENTIAL].items);
+    return true;
+}
+
+static bool do_solid_conductances(const argument *a, long long *answer) {
+    enum { STIFFNESS, K_S, E_STAR, CONDUCTANCE };
+    *answer = (long long)mbma_solid_conductances(a[STIFFNESS].count, a[STIFFNESS].items,
+                                                 a[K_S].items, a[E_STAR].items,
+                                                 a[CONDUCTANCE].items);
+    return true;
+}
+
 static bool do_yielding_planes(const argument *a, long long *answer) {
     enum { GAP, LOAD, ETA, LAW, PLANES };
     *answer = (long long)mbma_yielding_planes(a[GAP].count, a[GAP].items, a[LOAD].items,
@@ -980,6 +1008,7 @@ static bool do_yielding_planes(const argument *a, long long *answer) {
     FN(elementary, "i Dn wn") \
     FN(phi, "Dn Dn " TABLE "w3n b?n") \
     FN(totals, "Dn Dn Dn Dn d D8 " TABLE "w4n wn bn l1") \
+    FN(covered_areas, "Dn wn") \
     FN(island_geometry, "d d d D8 w") \
     FN(island_bands, "Dn Dn Dn D8 wn wn wn wn") \
     FN(island_places, "Dn Dn Dn Dn D8 wn wn wn wn wn wn wn") \
@@ -1021,6 +1050,9 @@ static bool do_yielding_planes(const argument *a, long long *answer) {
     FN(yielding_at_gaps, "Dn Dn Dn Dn Dn D11 wn wn") \
     FN(yielding_areas, "Dn Dn Dn D11 i wn") \
     FN(frozen_factors, "Dn D11 wn") \
+    FN(tangential_ratios, "Dn Dn wn") \
+    FN(tangential_stiffnesses, "Dn Dn wn") \
+    FN(solid_conductances, "Dn Dn Dn wn") \
     FN(yielding_planes, "Dn Dn Dn D11 wn")
 
 #endif

@@ -69,6 +69,9 @@ typedef struct {
 /* The island at delta = approach h_rms, approach >= MBMA_MIN_APPROACH. */
 int mbma_island_geometry(double approach, double hurst, double zeta_1, const mbma_variant *variant, mbma_island *out);
 
+/* A/A0 of islands that overlap at random, from the sum of their areas over A0. */
+size_t mbma_covered_areas(size_t n, const double *sum, double *area);
+
 /* F/(A0 E* q0 s), A/A0 and after each its derivative by the compression, `out` (n, 2, 2), of surfaces and gaps: hurst in
  * (0, 1], zeta_1 = q1/q0, compression (h_max - d)/h_rms and peak h_max/h_rms. `error` bounds the relative error, of
  * quadrature to `rtol` and of the table; `islands` counts those looked up. */
@@ -444,6 +447,15 @@ size_t mbma_yielding_areas(size_t n, const double *force, const double *elastic_
 
 /* Stiffness of the contact frozen as it is, by which it unloads first, over the elastic -dF/du at the same mean gap. */
 size_t mbma_frozen_factors(size_t n, const double *eta, const mbma_hardness_law *law, double *factor);
+
+/* kappa, normal over tangential stiffness before slip, (1 - nu c)/(1 - nu), of Poisson's ratio and c, which is 1/2 of
+ * isotropic surfaces; and tangential stiffness from that of a small unloading. */
+size_t mbma_tangential_ratios(size_t n, const double *nu, const double *share, double *kappa);
+size_t mbma_tangential_stiffnesses(size_t n, const double *stiffness, const double *kappa, double *tangential);
+
+/* Conductance of solid spots, from the stiffness of a small unloading, the mean conductivity and E*. */
+size_t mbma_solid_conductances(size_t n, const double *stiffness, const double *k_s, const double *E_star,
+                               double *conductance);
 
 /* Gaps between mean planes at mean gaps and loads F/(p_m A0), over h_rms: less the flattening of yielded points. */
 size_t mbma_yielding_planes(size_t n, const double *u, const double *load, const double *eta,

@@ -336,3 +336,12 @@ int mbma_island_geometry(double approach, double hurst, double zeta_1, const mbm
     *out = found;
     return MBMA_OK;
 }
+
+size_t mbma_covered_areas(size_t n, const double *sum, double *area) {
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        area[k] = -mbma_expm1(-sum[k]);
+        bad += area[k] != area[k];
+    }
+    return bad;
+}

@@ -323,6 +323,36 @@ size_t mbma_frozen_factors(size_t n, const double *eta, const mbma_hardness_law 
     return bad;
 }
 
+/* ---- what follows from the stiffness of a small unloading --------------------------------------- */
+
+size_t mbma_tangential_ratios(size_t n, const double *nu, const double *share, double *kappa) {
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        kappa[k] = (1.0 - nu[k] * share[k]) / (1.0 - nu[k]);
+        bad += kappa[k] != kappa[k];
+    }
+    return bad;
+}
+
+size_t mbma_tangential_stiffnesses(size_t n, const double *stiffness, const double *kappa, double *tangential) {
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        tangential[k] = stiffness[k] / kappa[k];
+        bad += tangential[k] != tangential[k];
+    }
+    return bad;
+}
+
+size_t mbma_solid_conductances(size_t n, const double *stiffness, const double *k_s, const double *E_star,
+                               double *conductance) {
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        conductance[k] = k_s[k] / E_star[k] * stiffness[k];
+        bad += conductance[k] != conductance[k];
+    }
+    return bad;
+}
+
 size_t mbma_yielding_planes(size_t n, const double *u, const double *load, const double *eta,
                             const mbma_hardness_law *law, double *gap) {
     size_t bad = 0;

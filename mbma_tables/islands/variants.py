@@ -13,8 +13,9 @@ from typing import Literal
 
 import numpy as np
 
-from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray, answered
 from mbma_tables.common.errors import InputError
+from mbma_tables.core import core
 from mbma_tables.surfaces.spectrum import NAYAK
 
 
@@ -75,7 +76,9 @@ class Variant:
 
     def area_of(self, area_sum: FloatArray) -> FloatArray:
         """A/A0 of the sum of islands' areas over A0; its relative error is at most the sum's."""
-        return -np.expm1(-area_sum) if self.addition == "cover" else area_sum
+        if self.addition == "sum":
+            return area_sum
+        return answered(core.covered_areas, (area_sum,))[0]
 
     @property
     def recorded(self) -> list[float]:

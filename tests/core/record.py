@@ -174,6 +174,12 @@ def use():
     force(0.1, 0.5, 0.2, -0.4, 0.3)
     diffused(np.linspace(0.0, 1.0, 30), np.geomspace(1e-3, 1.0, 30), -1.0)
     BearingCurve(np.linspace(3.0, 0.0, FRACTIONS.size), 3.3)
+    bodies = Bodies("1 GPa", nu=0.3, conductivity="45 W/(m K)")
+    in_units = Surface(0.7, 0.2, 60.0, 1.0, 3.0, unit="um")
+    pressed = contact(in_units, bodies, pressure=["1 MPa", "2 MPa"], theory="calibrated")
+    assert pressed.tangential_stiffness.all()
+    assert pressed.solid_conductance.all()
+    assert contact(few, separation=2.0, theory=Mbma(variant="fitted")).area.all()
     contact(many, mean_separation=1.0, theory="calibrated")
     # outside the calibrated table
     beyond = Surface(0.05, 1.0, 30.0, 1.0, 3.0)

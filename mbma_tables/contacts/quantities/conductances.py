@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import Numbers
+from mbma_tables.common.arguments import Numbers, answered
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import HEAT_CONDUCTANCE, factor
 from mbma_tables.contacts.quantities.declaration import DIMENSIONLESS, quantity
@@ -20,6 +20,7 @@ from mbma_tables.contacts.quantities.gas import (
 )
 from mbma_tables.contacts.quantities.interface import Gas
 from mbma_tables.contacts.quantities.state import Need, State
+from mbma_tables.core import core
 
 
 def _has_conductivity(contact: State) -> bool:
@@ -102,7 +103,9 @@ def solid_conductance(contact: State) -> Any:
     The slope of the loading curve of yielded contacts is up to ten times smaller.
     """
     return contact.evaluate(
-        lambda theory, surface, u, E_star, k_s, stiffness: (k_s / E_star * stiffness,),
+        lambda theory, surface, u, E_star, k_s, stiffness: tuple(
+            answered(core.solid_conductances, (stiffness, k_s, E_star))
+        ),
         1,
         {
             "conductivity": contact.bodies.conductivity[0],

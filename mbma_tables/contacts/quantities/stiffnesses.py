@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from mbma_tables.common.arguments import answered
 from mbma_tables.common.units import Dimension
 from mbma_tables.contacts.quantities.declaration import (
     LawFunction,
@@ -11,6 +12,7 @@ from mbma_tables.contacts.quantities.declaration import (
 )
 from mbma_tables.contacts.quantities.state import Need, State
 from mbma_tables.contacts.quantities.tangential import tangential_ratio_of
+from mbma_tables.core import core
 
 STIFFNESS = Dimension(stress=1, length=-1)
 ENERGY = Dimension(stress=1, length=1)
@@ -84,7 +86,17 @@ def unloading_stiffness(contact: State) -> Any:
 )
 def tangential_stiffness(contact: State) -> Any:
     """Tangential stiffness of full stick [stress/length], `unloading_stiffness`/kappa (Mindlin 1949)."""
-    return contact.unloading_stiffness / tangential_ratio_of(contact)
+    given = {
+        "unloading_stiffness": contact.unloading_stiffness,
+        "kappa": tangential_ratio_of(contact),
+    }
+    return contact.evaluate(
+        lambda theory, surface, u, E_star, stiffness, kappa: tuple(
+            answered(core.tangential_stiffnesses, (stiffness, kappa))
+        ),
+        1,
+        given,
+    )[0]
 
 
 @quantity(

@@ -10,9 +10,11 @@ const OF_ANSWER = {
   pressure: ({ force }) => force,
   area: ({ area }) => area,
   stiffness: ({ stiffness }) => stiffness,
-  // (2 - nu)/(2 (1 - nu)) is normal over tangential stiffness
-  tangential_stiffness: ({ unloading }, { nu }) => (unloading * 2 * (1 - nu)) / (2 - nu),
-  solid_conductance: ({ unloading }, { k_s, E_star }) => ((k_s / E_star) * unloading) / (METRE ?? 1),
+  tangential_stiffness: ({ unloading }, { nu }) =>
+    ofCore("mbma_tangential_stiffnesses", unloading, ofCore("mbma_tangential_ratios", nu, LIMITS.isotropic_share)),
+  // over a metre in units of the surface, as k_s is
+  solid_conductance: ({ unloading }, { k_s, E_star }) =>
+    ofCore("mbma_solid_conductances", unloading, k_s, E_star) / (METRE ?? 1),
 };
 const QUANTITIES = Object.keys(OF_ANSWER);
 const NAMES = { mbma: "MBMA", calibrated: "calibrated", persson: "Persson" };

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from mbma_tables import __version__
-from mbma_tables.bodies.materials import hardness_in
+from mbma_tables.bodies.materials import ISOTROPIC_SHARE, hardness_in
 from mbma_tables.common.arguments import number_in, positive_array
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import Units, factor
@@ -97,6 +97,7 @@ def _limits() -> dict[str, Any]:
         "compared": COMPARED,
         "area": ranges["area"],
         "max_samples": MAX_SAMPLES,
+        "isotropic_share": ISOTROPIC_SHARE,
         "hardness": dataclasses.astuple(hardness_law.CONSTANTS),
     }
 

@@ -38,9 +38,19 @@ const LAWS = { persson: OWN, calibrated: OWN + LAW_BYTES };
 const ARGUMENTS = OWN + 2 * LAW_BYTES,
   ANSWER = ARGUMENTS + 1024,
   YIELDING = ANSWER + 1024,
+  CALL = ARGUMENTS + 512,
   SAMPLES = YIELDING + 1024;
 const numbersAt = (place, count) => new Float64Array(C.memory.buffer, place, count);
 for (const [name, bytes] of tables) new Uint8Array(C.memory.buffer, C[name].value, bytes.length).set(bytes);
+
+// A number by a loop of the core over arrays, which have one entry here.
+function ofCore(name, ...numbers) {
+  const places = numbers.map((_, k) => CALL + 8 * k),
+    result = CALL + 8 * numbers.length;
+  numbersAt(CALL, numbers.length).set(numbers);
+  C[name](1, ...places, result);
+  return numbersAt(result, 1)[0];
+}
 
 // One surface, variant and modulus as functions of the mean separation, by theory.
 function prepare(state) {
@@ -77,7 +87,7 @@ function prepare(state) {
   return {
     mbma(u) {
       const found = answer(C.mbma_total_of(ARGUMENTS, 2 * u - state.h_max, state.E_star, RTOL, ANSWER));
-      if (found && variant.cover) found.area = -Math.expm1(-found.area);
+      if (found && variant.cover) found.area = ofCore("mbma_covered_areas", found.area);
       return found;
     },
     calibrated(u) {
