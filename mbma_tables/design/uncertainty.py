@@ -148,18 +148,6 @@ class Description:
         return middle
 
 
-@dataclasses.dataclass(frozen=True)
-class _Evaluated:
-    """Quantities of contacts in rows of draws, at pressures."""
-
-    central: Contact  # by which names and units are known
-    drawn: dict[str, FloatArray]  # numbers of the inputs
-    values: dict[str, FloatArray]  # (rows, pressures)
-    scatter: dict[str, FloatArray]  # of ln of the values; NaN where not known
-    valid: NDArray[np.bool_]
-    reasons: dict[str, NDArray[np.bool_]]
-
-
 def relative_scatter(pressed: Contact, name: str) -> Any:
     """Standard deviation of the model's error of ln of a quantity at a pressure, with its sign.
 
@@ -203,25 +191,28 @@ def _names(pressed: Contact, quantities: Sequence[str] | None) -> list[str]:
     return list(dict.fromkeys(quantities))
 
 
+_Batch = tuple[
+    dict[str, FloatArray],
+    dict[str, FloatArray],
+    NDArray[np.bool_],
+    dict[str, NDArray[np.bool_]],
+]
+
+
 def _evaluated(
     description: Description,
-    levels: FloatArray,
+    drawn: Mapping[str, FloatArray],
+    last: FloatArray,
     load: Load,
-    quantities: Sequence[str] | None,
-) -> _Evaluated:
+    names: Sequence[str],
+) -> _Batch:
     """The contacts of all draws: one batch, or one after the other where the batch is refused."""
     inputs = description.inputs
-    medians = of_all(inputs, lambda each: each.median)
-    central = description.make(medians)(load.at(0.5))
-    names = _names(central, quantities)
-    drawn = description.drawn(levels)
     typed = {name: inputs[name].written(rows[:, None]) for name, rows in drawn.items()}
-    # of the load, if it is a distribution: the last input then
-    last = levels[:, -1] if inputs else np.zeros(len(levels))
     pressures = load.at_all(last)
     try:
         pressed = description.make(typed)(pressures)
-        batches = [_of_contact(pressed, names, (len(levels), len(load.given)))]
+        batches = [_of_contact(pressed, names, (len(last), len(load.given)))]
     except InputError:
         # a number out of range is refused again there
         rows = [load.at(level) for level in last.tolist()]
@@ -234,22 +225,12 @@ def _evaluated(
     values, scatter, valid = (
         list(column) for column in zip(*[p[:3] for p in batches], strict=True)
     )
-    return _Evaluated(
-        central,
-        drawn,
+    return (
         {name: np.concatenate([each[name] for each in values]) for name in names},
         {name: np.concatenate([each[name] for each in scatter]) for name in names},
         np.concatenate(valid),
         reasons,
     )
-
-
-_Batch = tuple[
-    dict[str, FloatArray],
-    dict[str, FloatArray],
-    NDArray[np.bool_],
-    dict[str, NDArray[np.bool_]],
-]
 
 
 def _of_contact(pressed: Contact, names: Sequence[str], shape: tuple[int, int]) -> _Batch:
@@ -538,14 +519,20 @@ def uncertainty_of(
     corners = description.corners()
     # corners first: where one is refused, no draws are made in vain
     of_inputs = np.concatenate([corners, description.of_inputs(uniform)])
-    evaluated = _evaluated(description, of_inputs, load, quantities)
+    medians = of_all(description.inputs, lambda each: each.median)
+    central = description.make(medians)(load.at(0.5))
+    drawn = description.drawn(of_inputs)
+    # of the load, if it is a distribution: the last input then
+    last = of_inputs[:, -1] if description.inputs else np.zeros(len(of_inputs))
+    values, scatter_of, valid, reasons = _evaluated(
+        description, drawn, last, load, _names(central, quantities)
+    )
     error = _standard_normal(description.of_model(uniform))
-    drawn = evaluated.drawn
     columns = {name: rows[-draws:] for name, rows in drawn.items()} | {MODEL: error}
     bands = {}
     logarithms = []
-    for name, rows in evaluated.values.items():
-        scatter = evaluated.scatter[name][-draws:]
+    for name, rows in values.items():
+        scatter = scatter_of[name][-draws:]
         table = _with_model(rows[-draws:], scatter, error)
         bands[name] = np.quantile(table, levels, axis=0)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -556,18 +543,17 @@ def uncertainty_of(
     for k, name in enumerate(bands):
         own = slice(k * len(load.given), (k + 1) * len(load.given))
         shares[name] = {of: share[own] for of, share in fitted.items()}
-        scatter = evaluated.scatter[name][-draws:]
+        scatter = scatter_of[name][-draws:]
         is_stated = np.isfinite(scatter).all(axis=0)
         shares[name][MODEL] = np.where(is_stated, shares[name][MODEL], np.nan)
-    central = evaluated.central
     return Uncertainty(
         np.ravel(central.pressure),
         description.inputs,
         levels,
         bands,
         shares,
-        np.asarray(evaluated.valid.all(axis=0)),
-        evaluated.reasons,
+        np.asarray(valid.all(axis=0)),
+        reasons,
         draws,
         seed,
         {name: central.units[name] for name in ("pressure", *bands)},

@@ -67,9 +67,11 @@ class Solved(NamedTuple):
     pressure: Any  # in the unit of the modulus
     area: Any
     error: Any
-    answer: TheoryAnswer | None = None
     islands: int | None = None  # number of islands evaluated
+    answer: TheoryAnswer | None = None
     loaded: Any = None  # with a hardness, a `theories.yielding.theory.Loaded`
+    pressure_slope: Any = None  # derivatives by the separation, of sums over islands
+    area_slope: Any = None
 
 
 class Compression(NamedTuple):

@@ -1,7 +1,7 @@
 """Thermal and electrical conductance of a contact: of its solid spots, of the gas in its gaps, and of both."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -181,9 +181,10 @@ def gas_conductance_scatter(contact: State) -> Any:
     if gas.name == VACUUM:
         return 0.0 * contact.mean_separation
 
-    def scatter(gaps: GapsOfGas, conductivity: Any, of_gap: Any) -> Any:
-        of_mean = scatter_of_mean(gaps.area, gaps.jump, gaps.h_rms)
-        return np.hypot(of_mean, exponent_of_gap(*gaps) * of_gap / gaps.u)
+    def scatter(gaps: tuple[Any, ...], conductivity: Any, of_gap: Any) -> Any:
+        u, area, jump, h_rms, _ = gaps
+        of_mean = scatter_of_mean(area, jump, h_rms)
+        return np.hypot(of_mean, exponent_of_gap(*gaps) * of_gap / u)
 
     return _of_gaps(contact, gas, scatter, contact.separation_scatter)
 
@@ -198,24 +199,18 @@ def conductance_of_gas(contact: State, gas: Gas) -> Any:
         return 0.0 * contact.mean_separation
     metre = factor("m", contact.unit_system.length)
 
-    def conductance(gaps: GapsOfGas, conductivity: Any) -> Any:
+    def conductance(gaps: tuple[Any, ...], conductivity: Any) -> Any:
         return conductivity * metre * mean_inverse(*gaps)
 
     return _of_gaps(contact, gas, conductance)
 
 
-class GapsOfGas(NamedTuple):
-    """What the laws of `mbma_tables.contacts.quantities.gas` take, in the unit of lengths of a contact."""
-
-    u: Any
-    area: Any
-    jump: Any
-    h_rms: Any
-    eta: Any
-
-
 def _of_gaps(contact: State, gas: Gas, function: Callable[..., Any], *others: Any) -> Any:
-    """``function(gaps, conductivity, *others)`` of a contact's entries, with the gas's conductivity [W/(m K)]."""
+    """``function(gaps, conductivity, *others)`` of a contact's entries, with the gas's conductivity [W/(m K)].
+
+    Gaps are what the laws of `mbma_tables.contacts.quantities.gas` take: u, area, jump and
+    h_rms in the contact's unit of lengths, and eta.
+    """
     metre = factor("m", str(contact.unit_system.length))
 
     def of_entries(
@@ -231,7 +226,7 @@ def _of_gaps(contact: State, gas: Gas, function: Callable[..., Any], *others: An
     ) -> tuple[Any, ...]:
         conductivity, jump = jump_of(gas.name, temperature, pressure, accommodation)
         eta = getattr(theory, "hardness", np.inf) / np.asarray(surface.rms_gradient)
-        gaps = GapsOfGas(u, area, jump * metre, surface.h_rms, eta)
+        gaps = (u, area, jump * metre, surface.h_rms, eta)
         return (function(gaps, conductivity, *more),)
 
     of_metals = GASES[gas.name].accommodation

@@ -27,6 +27,7 @@ from mbma_tables.surfaces.spectrum import Band
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.tables.island4d import Island4dModel
 from mbma_tables.tables.universal import UniversalModel
+from mbma_tables.theories.base import Solved
 from mbma_tables.theories.mbma.profile import Shape, profile
 
 QUADRATURE_SHARE = 0.9  # of the requested tolerance; a table's own error comes on top
@@ -49,27 +50,17 @@ class Sums(NamedTuple):
     outside: str = "raise"
 
 
-class Totals(NamedTuple):
-    """Force and area of the MBMA model at given separations, with the fields of `Contact`."""
-
-    pressure: Any
-    area: Any
-    error: Any  # bound on that of quadrature and islands, relative to the island model
-    islands: int
-    pressure_slope: Any = None  # derivatives by the separation
-    area_slope: Any = None
-
-
 def totals_at(
     surface: AnySurface,
     gap: FloatArray,
     how: Sums,
     modulus: Any = 1.0,
     slopes: bool = False,
-) -> Totals:
+) -> Solved:
     """Force and area, perhaps with their slopes, at separations d >= -h_max.
 
-    The separations have the surface's broadcast shape.
+    The separations have the surface's broadcast shape. The error is a bound on that of
+    quadrature and islands, relative to the island model.
     """
     shape = gap.shape
     depth = np.asarray(surface.h_max - gap)
@@ -89,7 +80,7 @@ def totals_at(
     is_cover = how.variant.addition == "cover"
     area = how.variant.area_of(area_sum) if is_cover else area_sum
     if not slopes:
-        return Totals(pressure[()], area[()], error[()], islands)
+        return Solved(pressure[()], area[()], error[()], islands)
 
     # by the compression (h_max - d)/h_rms in the sums
     pressure_slope = stress * (-rows[2].reshape(shape) / surface.h_rms)
@@ -97,13 +88,13 @@ def totals_at(
     if is_cover:
         # dA = exp(-sum) dsum
         area_slope = area_slope * np.exp(-area_sum)
-    return Totals(
+    return Solved(
         pressure[()],
         area[()],
         error[()],
         islands,
-        pressure_slope[()],
-        area_slope[()],
+        pressure_slope=pressure_slope[()],
+        area_slope=area_slope[()],
     )
 
 

@@ -39,7 +39,6 @@ from mbma_tables.theories.mbma.profile import Shape, profile, shape_of
 from mbma_tables.theories.mbma.sums import (
     QUADRATURE_SHARE,
     Sums,
-    Totals,
     spectra_of,
     totals_at,
 )
@@ -126,7 +125,7 @@ class Mbma(Theory):
         separation: FloatArray,
         E_star: ArrayLike = 1.0,
         slopes: bool = False,
-    ) -> Totals:
+    ) -> Solved:
         """Force and area at separations d [length] of the surface's broadcast shape."""
         gap = np.asarray(separation, float)
         require(
@@ -141,8 +140,7 @@ class Mbma(Theory):
 
     def solved(self, surface: AnySurface, gaps: Gaps, modulus: FloatArray) -> Solved:
         """Totals at separations d, the model's own coordinate, without their slopes."""
-        totals = self.totals(surface, gaps.separation, modulus)
-        return Solved(totals.pressure, totals.area, totals.error, islands=totals.islands)
+        return self.totals(surface, gaps.separation, modulus)
 
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Force, area and stiffness at mean separations u [length] from 0 to h_max."""

@@ -131,26 +131,21 @@ class Plastic(BoundaryElements):
 plastic = shared(KEPT)(Plastic)
 
 
-class Released(BoundaryElements):
+@shared(KEPT)
+def released(theory: BoundaryElements, cap: float, largest: float) -> BoundaryElements:
     """The map as a load left it, p_m/E* = `cap`, pressed elastically up to that load over A0 E*."""
-
-    of_yielded_gaps = True
-
-    def __init__(self, theory: BoundaryElements, cap: float, largest: float) -> None:
-        known = theory.pressed
-        assert isinstance(known, Press)
-        shape = known.heights, known.sizes, known.gradient, TOLERANCE, known.mirrored
-        loaded = Press(*shape, cap, left_out=known.left_out)
-        self.residual_heights = loaded.residual(largest)
-        press = Press(self.residual_heights, *shape[1:], left_out=known.left_out)
-        force, rows = press.loads(largest * np.array(UNLOADED), False)
-        top = float(self.residual_heights.max() - self.residual_heights.mean())
-        rows = np.array([force, *rows])
-        more = theory.points, press, theory.origin, theory.grid, top
-        super().__init__(theory.surface, rows, *more, given=theory.given)
-
-
-released = shared(KEPT)(Released)
+    known = theory.pressed
+    assert isinstance(known, Press)
+    shape = known.heights, known.sizes, known.gradient, TOLERANCE, known.mirrored
+    residual = Press(*shape, cap, left_out=known.left_out).residual(largest)
+    press = Press(residual, *shape[1:], left_out=known.left_out)
+    force, rows = press.loads(largest * np.array(UNLOADED), False)
+    top = float(residual.max() - residual.mean())
+    rows = np.array([force, *rows])
+    more = theory.points, press, theory.origin, theory.grid, top
+    made = BoundaryElements(theory.surface, rows, *more, given=theory.given)
+    made.of_yielded_gaps = True
+    return made
 
 
 def by_entry(
@@ -292,8 +287,7 @@ class Residuals(Theory):
         loading = self.loading
         if largest == 0 or loading.is_beyond_reach(cap):
             return loading.elastic
-        simulation: BoundaryElements = released(loading.elastic, cap, largest)
-        return simulation
+        return released(loading.elastic, cap, largest)
 
     def _each(self, ask: Callable[..., Any], *given: ArrayLike) -> Any:
         keys = [self.loading.hardness, self.largest]
