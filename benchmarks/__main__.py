@@ -35,6 +35,7 @@ from benchmarks.exports import exported
 from benchmarks.functions import functions
 from benchmarks.kernels import BEFORE, held_out, measured
 from benchmarks.maps import maps
+from benchmarks.programs import exports_command
 from benchmarks.rows import LINES, Line, microseconds, report, rounds, times_faster
 from benchmarks.scenes import scenes
 from benchmarks.surrogates import surrogates
@@ -650,6 +651,7 @@ def joints_command(write: bool) -> None:
 main.add_command(functions)
 main.add_command(surrogates)
 main.add_command(display_command)
+main.add_command(exports_command)
 
 if __name__ == "__main__":
     main()

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterable
 
+from generate.files import ROOT
 from generate.page import Measured, table
 from mbma_tables.export.registry import targets
 from mbma_tables.export.targets import Target
+
+# written by `python -m benchmarks exports --write`
+MEASURED = ROOT / "docs" / "data" / "exports.csv"
 
 
 def formats() -> Measured:
@@ -20,7 +25,24 @@ def formats() -> Measured:
     for name, target in targets("LAWS", "FMUS", "CODE").items():
         code.append((f"`{name}`", target.output, target.tested))
     of_code = table("target | output | tested with", code)
-    return {"code": of_code, "formats": table(header, rows)}, {}
+    blocks = {"code": of_code, "formats": table(header, rows), "programs": _programs()}
+    return blocks, {}
+
+
+def _programs() -> str:
+    """What was measured of every target, and what it does outside the range of a law."""
+    rows = []
+    with MEASURED.open(encoding="utf-8") as stream:
+        measured = {row["target"]: row for row in csv.DictReader(stream)}
+    for name in targets():
+        one = measured.get(name)
+        if one is None:
+            continue
+        share = f"{100 * float(one['share']):.2g}%"
+        cells = (one["program"], one["laws"], one["error"], share, one["date"])
+        rows.append((f"`{name}`", *cells))
+    header = "target | read or run by | laws | largest error | of the stated one | date"
+    return table(header, rows)
 
 
 def _quantities(target: Target) -> str:

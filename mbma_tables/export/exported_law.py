@@ -27,7 +27,7 @@ from mbma_tables.contacts.quantities.interface import NOTHING_BETWEEN, Gas, Inte
 from mbma_tables.contacts.quantities.stiffnesses import tangential_stiffness
 from mbma_tables.effects.force_law import ForceLaw
 from mbma_tables.effects.rough_contact import pressed
-from mbma_tables.export.text import about, number
+from mbma_tables.export.text import about, bound, number
 from mbma_tables.islands.variants import Variant
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.surface import MeasuredSurface
@@ -291,7 +291,7 @@ class ExportedLaw:
             *meaning,
             f"range: {range_}",
             *more,
-            f"the law is within {law.error:.1e} of its theory, in pressure and area",
+            f"the law is within {bound(law.error)} of its theory, in pressure and area",
             plastic,
             *self._validity(end, leakage),
             *self._hashes(),
@@ -406,7 +406,7 @@ class ExportedLaw:
                 yield f"K is not known from c = {number(self.unknown_from)} on: {unknown}"
         else:
             yield "never blocked"
-        yield f"K is within {self.leakage.error:.1e} of that at the law's area"
+        yield f"K is within {bound(self.leakage.error)} of that at the law's area"
         yield f"scatter of K from simulation to simulation, {scatter}"
 
 

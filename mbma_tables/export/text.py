@@ -7,6 +7,7 @@ import re
 import shlex
 import textwrap
 from collections.abc import Container, Iterable
+from decimal import ROUND_CEILING, Context
 from typing import Any, SupportsFloat
 
 import numpy as np
@@ -221,6 +222,18 @@ def number(
 def about(value: SupportsFloat, digits: int = 4) -> str:
     """A number of a header, rounded for its reader."""
     return number(value, digits=digits, infinity="infinity", missing="not known")
+
+
+def bound(value: float) -> str:
+    """The bound of an error in a header, in two digits, which are rounded up.
+
+    Examples
+    --------
+    >>> bound(9.81e-4), bound(2.0e-3), bound(0.0)
+    ('9.9e-04', '2.0e-03', '0.0e+00')
+    """
+    rounded_up = Context(prec=2, rounding=ROUND_CEILING).create_decimal(repr(float(value)))
+    return f"{float(rounded_up):.1e}"
 
 
 def _pointed(text: str, exponent: str = "") -> str:

@@ -1,7 +1,6 @@
 """Laws in every language of the registry: random laws, run back and compared with the library's within what they state."""
 
 import math
-import re
 import shutil
 import subprocess
 import sys
@@ -12,6 +11,7 @@ import pytest
 from hypothesis import strategies as st
 from law_points import KAPPA, TANGENTS, VALUES
 
+from benchmarks import programs
 from mbma_tables import Bodies, Gas, Surface
 from mbma_tables.contacts.quantities import registry
 from mbma_tables.contacts.quantities.interface import Interface
@@ -29,7 +29,7 @@ POINTS = 60
 SLOW = ("jax-law", "matlab-law", "modelica-law")
 QUICK = ("c-law", "javascript-law", "python-law")
 # laws a language; a program of the slow ones takes seconds to tens of seconds
-EXAMPLES = dict.fromkeys(LANGUAGES, 4) | dict.fromkeys(SLOW, 3)
+EXAMPLES = dict.fromkeys(LANGUAGES, 4) | dict.fromkeys(SLOW, 2)
 
 
 @pytest.fixture(autouse=True)
@@ -137,15 +137,6 @@ def made(target, law):
     return asked_law(surface, bodies, "road", **more, **options)
 
 
-def stated(asked, name):
-    """The largest relative error of a function, as the header states it; a thousand roundings of one that it does not name."""
-    text = " ".join(asked.said)
-    # the solid spots' part of the total is that of the law
-    name = {"leakage": "K", "total_conductance": "gas_conductance"}.get(name, name)
-    found = re.search(rf"\b{name} is within (\S+) of", text)
-    return float(found[1]) if found else TANGENTS
-
-
 def known(asked, gas, name, c):
     """A quantity by the law of the library itself, and what errors are relative to."""
     exported = asked.exported
@@ -181,13 +172,7 @@ def run(target, asked, names, c, folder):
         (folder / f"road{file.end}").write_text(
             text_of(file.target or target, asked, file)
         )
-    (folder / program.file).write_text(program.written("road", names))
-    np.savetxt(folder / "c.txt", c, "%.17g")
-    for command in program.commands:
-        words = command.replace("python ", f"{sys.executable} ").split()
-        done = subprocess.run(words, cwd=folder, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-    return np.loadtxt(folder / "values.txt", ndmin=2).T
+    return programs.run(program, names, c, folder)
 
 
 def compared(target, law, folder):
@@ -219,7 +204,7 @@ def compared(target, law, folder):
     for name in asked.functions:
         value, size = known(asked, law[2], name, c)
         error = np.abs(found[name] - value)[size > 0] / size[size > 0]
-        shares[name] = error.max(initial=0.0) / stated(asked, name)
+        shares[name] = error.max(initial=0.0) / programs.stated(" ".join(asked.said), name)
         assert (found[name][size == 0] == 0).all(), name
     return shares
 

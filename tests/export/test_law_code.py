@@ -23,7 +23,7 @@ from mbma_tables.export import LAWS
 from mbma_tables.export.code.core_code import core_text
 from mbma_tables.export.code.languages import LANGUAGES
 from mbma_tables.export.code.law_code import asked_law, law_files, law_text, text_of
-from mbma_tables.export.text import core_file
+from mbma_tables.export.text import bound, core_file
 
 SUBROUTINES = [target for target, language in LANGUAGES.items() if language.subroutine]
 QUANTITIES = ("pressure", "tangent", "area", "energy", "leakage")
@@ -138,7 +138,7 @@ def test_headers_say_what_is_there():
     )
     leakage = points("calibrated").law.leakage
     facts = (
-        f"K is within {leakage.error:.1e} of that at the law's area",
+        f"K is within {bound(leakage.error)} of that at the law's area",
         "one standard deviation of ln K: 0.1",
     )
     facts += f"c = {float(3 - leakage.blocked_at)!r} on", "leakage: A/A0 is above 0.3"

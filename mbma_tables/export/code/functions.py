@@ -8,6 +8,7 @@ from mbma_tables.contacts.quantities import registry
 from mbma_tables.export.code.curves import Curve, Quantity, curve_of_flow, curve_of_gas
 from mbma_tables.export.code.language import Function
 from mbma_tables.export.exported_law import ExportedLaw, GasInGaps
+from mbma_tables.export.text import bound
 
 
 class Functions:
@@ -47,7 +48,7 @@ class Functions:
             "gas_conductance",
             solid.unit,
             curve_of_gas(self.exported, gas),
-            "is within {error:.1e} of the theory's, relative to it, or to that at first "
+            "is within {error} of the theory's, relative to it, or to that at first "
             "contact where that is larger",
         )
         meaning = registry.get("total_conductance").meaning
@@ -63,7 +64,7 @@ class Functions:
             unit, meaning or registry.get(name).meaning, curve=name
         )
         if note:
-            self._notes[name] = f"{name} {note.format(error=curve.error)}"
+            self._notes[name] = f"{name} {note.format(error=bound(curve.error))}"
 
     def add_flow(self) -> None:
         """The flow coefficient of the gaps, on which the header has lines of its own."""
@@ -86,6 +87,6 @@ class Functions:
             name,
             quantity.unit,
             quantity.curve(),
-            "is within {error:.1e} of the contact's, relative to it, from "
+            "is within {error} of the contact's, relative to it, from "
             f"c = {quantity.c[0]:.4g} on{end}",
         )

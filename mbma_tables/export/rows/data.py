@@ -281,7 +281,9 @@ def _matlab_curves(held: dict[str, Any]) -> list[Curve]:
     for name in ("x", "y"):
         columns[held[f"{name}_name"].item()] = held.pop(name)[:, 0]
     for name, values in held.items():
-        if isinstance(values, np.ndarray) and values.shape == (rows, 1):
+        # comments may be as many as rows
+        is_numeric = isinstance(values, np.ndarray) and values.dtype.kind == "f"
+        if is_numeric and values.shape == (rows, 1):
             columns[name] = values[:, 0]
     return _curves(columns)
 

@@ -48,7 +48,7 @@ from mbma_tables.export.targets import (
     options_of,
     require_quantity,
 )
-from mbma_tables.export.text import about, number
+from mbma_tables.export.text import about, bound, number
 from mbma_tables.islands.variants import Variant
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import Theory, UserTheory
@@ -68,6 +68,7 @@ FILM_ROWS = 200
 FILM_RANGE = (0.2 * (1 + 1e-9), 10.0)  # u/h_rms
 NEAREST_GAP = 1e-9  # smallest overclosure of a film evaluated, over h_max
 FILM_NAMES = ("phi_x", "phi_y", "shear_x", "shear_y", "pressure")
+OF_SPOTS = ("pressure", "area", "stiffness")  # columns of a film that end with contact
 
 
 @hinted
@@ -518,7 +519,7 @@ def _known_part(
 
 def _of_rows(name: str, rows: int, error: float, above: str) -> str:
     """The line of a header on the rows of one quantity."""
-    return f"{name}: {rows} rows; largest error of linear interpolation {error:.1e}, relative, above {above}"
+    return f"{name}: {rows} rows; largest error of linear interpolation {bound(error)}, relative, above {above}"
 
 
 def _of_aperture(
@@ -613,27 +614,31 @@ def _film_rows(
     middle = at((u[1:] + u[:-1]) / 2)
     tested = found.pressure[~below(found.area, elastic_ranges()["area"])]
     floor = least if least is not None else float(tested.min()) if tested.size else np.inf
-    errors = {}  # largest of linear interpolation, in the middle of the intervals
-    for name in FILM_NAMES:
-        value = getattr(found, name)
-        between = getattr(middle, name)
-        kept = middle.valid & (between > (floor if name == "pressure" else 0))
-        off = (value[1:] + value[:-1])[kept] / (2 * between[kept]) - 1
-        errors[name] = float(np.abs(off).max(initial=0.0))
-    error = max(errors.values())
-    listed = ", ".join(f"{name} {value:.1e}" for name, value in errors.items())
     units = dict.fromkeys((*FILM_NAMES, "area", "scatter"), "1") | {"pressure": stress}
     columns = {name: (getattr(found, name), unit) for name, unit in units.items()}
     columns["stiffness"] = (
         np.asarray(exported.answer(u).unloading_stiffness),
         f"{stress}/{length}",
     )
+    pressed = middle.valid & (middle.pressure > floor)
+    errors = {}  # largest of linear interpolation, in the middle of the intervals
+    for name, (value, _) in columns.items():
+        between = (
+            np.asarray(exported.answer(middle.mean_separation).unloading_stiffness)
+            if name == "stiffness"
+            else getattr(middle, name)
+        )
+        kept = pressed if name in OF_SPOTS else middle.valid & (between > 0)
+        off = (value[1:] + value[:-1])[kept] / (2 * between[kept]) - 1
+        errors[name] = float(np.abs(off).max(initial=0.0))
+    error = max(errors[name] for name in FILM_NAMES)
+    listed = ", ".join(f"{name} {bound(value)}" for name, value in errors.items())
     gaps = {reason: found.mean_separation[bad] for reason, bad in found.reasons.items()}
     comments = exported.header(
         f"{', '.join(f'{name} [{unit}]' for name, (_, unit) in columns.items())} against mean_separation [{length}]",
         f"mean separation u from {number(u[0])} to {number(u[-1])} {length}",
         f"{rows} rows; largest errors of linear interpolation, relative, where flow factors are valid: {listed}; of "
-        f"pressures above {about(floor)} {stress}",
+        f"{', '.join(OF_SPOTS)} at pressures above {about(floor)} {stress}",
         "flow along x is -phi_x u^3/(12 viscosity) dp/dx + (U1 + U2)/2 u + (U1 - U2)/2 h_rms shear_x",
         "stiffness is that of a small change of the gap, with the contact area as it is",
         f"peklenik = {about(found.peklenik, 6)}: length of the roughness along x over that along y",

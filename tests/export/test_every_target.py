@@ -1,0 +1,82 @@
+"""Numbers of every target, read back or run, beside the library's contacts: random laws in four systems of units.
+
+`python -m benchmarks exports` has a thousand of them, and the table of docs/export.md.
+"""
+
+import dataclasses
+import itertools
+import shutil
+
+import pytest
+
+from benchmarks import programs
+from mbma_tables.export.code.languages import LANGUAGES
+from mbma_tables.export.registry import targets
+
+OF_ROWS = targets("SOLVERS", "DATA")
+OF_CODE = programs.of_code()
+QUICK = ("c-law", "javascript-law", "python-law")
+# laws by their numbers, of which the first is in the units that some programs prescribe
+FIRST = 2000
+
+
+@pytest.fixture(scope="module")
+def rows():
+    """Rows of a law of every kind, all quantities in turns, and all of the joint in metres and pascals."""
+    made = []
+    for place, kind in enumerate(programs.KINDS):
+        one = programs.case(FIRST + place, kind, programs.SYSTEMS[place])
+        names = list(programs.quantities(one))
+        some = names if place == 0 else (names[0], names[place])
+        made += [(one, programs.rows(one, name)) for name in some]
+    return made
+
+
+@pytest.mark.parametrize("name", OF_ROWS)
+def test_numbers_of_rows_are_those_of_the_library(name, rows):
+    if name == "parquet":
+        pytest.importorskip("pyarrow")
+    found = [programs.in_rows(one, OF_ROWS[name], law) for one, law in rows]
+    found = [one for one in found if one is not None]
+    assert found
+    for one in found:
+        assert 0 < one.share <= 1
+
+
+def test_a_wrong_number_is_noticed(rows):
+    """The comparison does not pass what is no number of the library."""
+    one, law = rows[0]
+    wrong = dataclasses.replace(law, y=1.003 * law.y)
+    found = programs.in_rows(one, OF_ROWS["csv"], wrong)
+    assert found.share > 1
+
+
+def skip_without(name):
+    """Skip the test where the programs of a target are not installed."""
+    words = ["cc"]
+    modules = ["fmpy"] if name.startswith("fmu") else []
+    if name in LANGUAGES:
+        program = LANGUAGES[name].program
+        modules = program.modules
+        words = [command.split()[0] for command in program.commands]
+    for word in {*words} - {"python"}:
+        if not word.startswith("./") and shutil.which(word) is None:
+            pytest.skip(f"not installed: {word}")
+    for module in modules:
+        pytest.importorskip(module)
+
+
+@pytest.mark.parametrize(
+    ("name", "place"),
+    [
+        pytest.param(name, place, marks=() if name in QUICK else pytest.mark.slow)
+        for name, place in zip(OF_CODE, itertools.count())
+    ],
+)
+def test_functions_of_code_are_those_of_the_library(name, place, tmp_path):
+    skip_without(name)
+    kinds = programs.kinds_of(name)
+    system = programs.SYSTEMS[place // 2 % len(programs.SYSTEMS)]
+    one = programs.case(FIRST + place, kinds[-place % len(kinds)], system)
+    found = OF_CODE[name](one, name, tmp_path)
+    assert 0 < found.share <= 1
