@@ -101,6 +101,9 @@ class Found(NamedTuple):
         return Found(max(self.error, other.error), max(self.share, other.share))
 
 
+NOTHING = Found(0.0, 0.0)
+
+
 @dataclasses.dataclass(frozen=True)
 class Case:
     """A random law, in metres and pascals, and the units of its files."""
@@ -195,9 +198,7 @@ def _map(seed: int) -> Any:
     q = np.hypot(waves[:, None], waves[None])
     noise = np.fft.fft2(rng.normal(size=q.shape))
     heights = np.fft.ifft2(np.where((q > 0.1) & (q < 1.0), noise, 0)).real
-    return Surface.from_map(
-        5e-7 * heights / heights.std(), 1e-6, periodic=True, unit="m"
-    )
+    return Surface.from_map(5e-7 * heights / heights.std(), 1e-6, periodic=True, unit="m")
 
 
 def case(number: int, kind: str = "", system: tuple[str, str] | None = None) -> Case:
@@ -272,14 +273,17 @@ def column_of(law: LawTable, name: str) -> tuple[LawTable, str]:
 def in_rows(one: Case, target: Target, law: LawTable) -> Found | None:
     """Numbers of a file of rows beside the library's; None where the program does not take these rows."""
     units = target.units
-    if not target.takes_rows(law.quantity) or units not in (None, (one.length, one.stress)):
+    if not target.takes_rows(law.quantity) or units not in (
+        None,
+        (one.length, one.stress),
+    ):
         return None
     if law.x.size > target.most.get(law.quantity, law.x.size):
         return None
     out = pathlib.Path(f"law{target.end or '.txt'}")
     content = files_of([law], target.name, Options(), out).files[""]
     assert target.read is not None
-    found = Found(0.0, 0.0)
+    found = NOTHING
     curves = target.read(content)
     assert curves
     for curve in curves:
@@ -315,7 +319,9 @@ def stated_of(comments: tuple[str, ...], column: str) -> float:
     of_law = re.search(r"the law is within (\S+) of its theory", text)
     of_rows = re.search(
         rf"\b{column}: \d+ rows; largest error of linear interpolation (\S+),", text
-    ) or re.search(rf"largest errors of linear interpolation, .*?\b{column} (\S+?)[,;]", text)
+    ) or re.search(
+        rf"largest errors of linear interpolation, .*?\b{column} (\S+?)[,;]", text
+    )
     assert of_law is not None
     assert of_rows is not None, column
     return float(of_law[1]) + float(of_rows[1])
@@ -449,7 +455,7 @@ def of_functions(
 ) -> Found:
     """Answers of functions beside those of the law in the same units."""
     of_law = law.values(separation=d)
-    found = Found(0.0, 0.0)
+    found = NOTHING
     scales = {"tangent": np.maximum(np.abs(of_law.stiffness), 1e-2 * of_law.pressure / c)}
     for name, value in answers.items():
         if name in OF_LAWS:
@@ -587,7 +593,7 @@ class Measured:
     """What was measured of a target."""
 
     laws: int = 0
-    found: Found = Found(0.0, 0.0)
+    found: Found = NOTHING
 
 
 def measured(
@@ -712,7 +718,9 @@ def exports_command(laws: int, first: int, write: bool) -> None:
     results = read_csv() if first else {}
     measured(range(first, laws), results, keep)
     for name, one in results.items():
-        click.echo(f"{name}: {one.laws} laws, error {one.found.error:.1e}, "
-                   f"of the stated one {one.found.share:.2f}")
+        click.echo(
+            f"{name}: {one.laws} laws, error {one.found.error:.1e}, "
+            f"of the stated one {one.found.share:.2f}"
+        )
     if write:
         page.write("export", formats()[0], {}, ROOT)

@@ -232,7 +232,9 @@ def bound(value: float) -> str:
     >>> bound(9.81e-4), bound(2.0e-3), bound(0.0)
     ('9.9e-04', '2.0e-03', '0.0e+00')
     """
-    rounded_up = Context(prec=2, rounding=ROUND_CEILING).create_decimal(repr(float(value)))
+    rounded_up = Context(prec=2, rounding=ROUND_CEILING).create_decimal(
+        repr(float(value))
+    )
     return f"{float(rounded_up):.1e}"
 
 

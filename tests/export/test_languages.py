@@ -204,7 +204,9 @@ def compared(target, law, folder):
     for name in asked.functions:
         value, size = known(asked, law[2], name, c)
         error = np.abs(found[name] - value)[size > 0] / size[size > 0]
-        shares[name] = error.max(initial=0.0) / programs.stated(" ".join(asked.said), name)
+        shares[name] = error.max(initial=0.0) / programs.stated(
+            " ".join(asked.said), name
+        )
         assert (found[name][size == 0] == 0).all(), name
     return shares
 
