@@ -1,7 +1,7 @@
 """Long computations that Ctrl-C can end."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 Answer = TypeVar("Answer")
@@ -20,20 +20,30 @@ def interruptible(compute: Callable[[], Answer]) -> Answer:
 
     What it computes then goes on in a thread of its own to its end, or to that of the process.
     """
-    results: list[Answer] = []
+    return at_once([compute])[0]
+
+
+def at_once(computations: Sequence[Callable[[], Answer]]) -> list[Answer]:
+    """Results of several such calls, each in a thread of its own."""
+    results: dict[int, Answer] = {}
     errors: list[BaseException] = []
 
-    def run() -> None:
+    def run(number: int) -> None:
         try:
-            results.append(compute())
+            results[number] = computations[number]()
         except BaseException as error:
             errors.append(error)
 
-    thread = threading.Thread(target=run, daemon=True)
-    thread.start()
-    # a signal may be given to the other thread: this one looks for it itself
-    while thread.is_alive():
-        thread.join(WAIT)
+    threads = [
+        threading.Thread(target=run, args=(number,), daemon=True)
+        for number in range(len(computations))
+    ]
+    for thread in threads:
+        thread.start()
+    # a signal may be given to another thread: this one looks for it itself
+    for thread in threads:
+        while thread.is_alive():
+            thread.join(WAIT)
     if errors:
         raise errors[0]
-    return results[0]
+    return [results[number] for number in range(len(computations))]

@@ -1,5 +1,7 @@
 """Flow factors: exact limits, published curves, Reynolds' equation on gaps that no fit saw; its solver."""
 
+import pathlib
+
 import numpy as np
 import pytest
 from helpers import random_map, refusals
@@ -15,6 +17,7 @@ from mbma_tables.theories.simulated.reynolds import (
     open_ways,
 )
 
+STATUS = pathlib.Path("/proc/self/status")
 BEARING = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
 
 
@@ -245,3 +248,19 @@ test_no_gaps = refusals(
     (np.full((4, 4), -1.0), "gap must be at least 0"),
     (np.full((4, 4), np.nan), "gap must be finite"),
 )
+
+
+@pytest.mark.skipif(not STATUS.exists(), reason="resident memory is read from /proc")
+def test_factors_of_many_gaps_are_freed():
+    def resident() -> int:
+        lines = STATUS.read_text("utf-8").splitlines()
+        line = next(line for line in lines if line.startswith("VmRSS"))
+        return int(line.split()[1])  # kB
+
+    gap = np.random.default_rng(3).uniform(0.5, 1.5, (128, 128))
+    flow_conductance(gap)
+    before = resident()
+    for _ in range(5):
+        flow_conductance(gap)
+    # the factors of one such grid have 12 MB
+    assert resident() - before < 12e3

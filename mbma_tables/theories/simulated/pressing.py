@@ -6,6 +6,7 @@ Each load, and each flow, is stored in `mbma_tables.common.cache` as soon as it 
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 from collections.abc import Callable
 from typing import Any
@@ -15,6 +16,7 @@ import numpy as np
 from mbma_tables.common import cache
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
+from mbma_tables.common.interrupts import at_once
 from mbma_tables.common.progress import doing, shown
 from mbma_tables.surfaces.map_simulation import ROUNDING
 from mbma_tables.theories.simulated.boundary_elements import (
@@ -24,7 +26,7 @@ from mbma_tables.theories.simulated.boundary_elements import (
     waves,
 )
 from mbma_tables.theories.simulated.grids import FULL
-from mbma_tables.theories.simulated.reynolds import flow_tensor
+from mbma_tables.theories.simulated.reynolds import AT_ONCE, flow_tensor
 
 TOLERANCE = FULL.tolerance
 LOWEST, HIGHEST = FULL.tested  # A/A0 that the loads reach at least
@@ -225,44 +227,53 @@ class Press:
         `separation` is u at ln F.
         """
         found: dict[float, FloatArray] = {}
+        # between mirrors the two axes are solved at once
+        side_by_side = 1 if self.mirrored or self.heights.size > AT_ONCE else 2
 
-        def add(own: float) -> bool:
-            doing(
-                f"flow through the gaps {_bar(len(found), max(x.size // 2 + FLOWS // 2, len(found) + 1))}"
-            )
-            found[own] = self.flow(float(np.exp(own)))
-            return bool(found[own][:2].any())
+        def add(loads: list[float]) -> None:
+            number = max(x.size // 2 + FLOWS // 2, len(found) + len(loads))
+            doing(f"flow through the gaps {_bar(len(found), number)}")
+            forces = [float(np.exp(own)) for own in loads]
+            # gaps first: the engine goes from load to load
+            for force in forces:
+                self(force)
+            flows = at_once([functools.partial(self.flow, force) for force in forces])
+            found.update(zip(loads, flows, strict=True))
 
         with shown("flow through the gaps"):
-            # once blocked both ways, heavier loads are
-            for own in x[::2].tolist():
-                if not add(own):
+            every = x[::2].tolist()
+            for first in range(0, len(every), side_by_side):
+                add(every[first : first + side_by_side])
+                # once blocked both ways, heavier loads are
+                if not found[max(found)][:2].any():
                     break
-            for _ in range(FLOWS):
-                at = np.array(sorted(found))
-                K = np.array([found[own][:2] for own in at.tolist()])
-                with np.errstate(divide="ignore", invalid="ignore"):
-                    fall = np.nan_to_num(np.log(K[:-1] / K[1:]), posinf=np.inf)
-                closing = np.where(np.diff(at) > NARROW, CLOSING, 0.0)[:, None]
-                heavy = (
-                    np.array([self(float(np.exp(own)))[0][0] for own in at[:-1].tolist()])
-                    > AREA_OF_FLOW
-                )
-                worst = np.where(np.isinf(fall), closing, fall).max(axis=1) * np.where(
-                    heavy, BEYOND, 1.0
-                )
-                k = int(worst.argmax())
-                if worst[k] < STEEP:
+            while len(found) < len(every) + FLOWS:
+                steep = self._steep(found, x)[:side_by_side]
+                if not steep:
                     break
-                between = x[(x > at[k]) & (x < at[k + 1])]
-                add(
-                    float(between[between.size // 2])
-                    if between.size
-                    else float(at[k] + at[k + 1]) / 2
-                )
+                add(steep)
         at = np.array(sorted(found))
         cache.trim()
         return separation(at), np.array([found[own] for own in at.tolist()])
+
+    def _steep(self, found: dict[float, FloatArray], x: FloatArray) -> list[float]:
+        """Loads ln F between those whose flow falls most from one to the next, steepest first."""
+        at = np.array(sorted(found))
+        K = np.array([found[own][:2] for own in at.tolist()])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            fall = np.nan_to_num(np.log(K[:-1] / K[1:]), posinf=np.inf)
+        closing = np.where(np.diff(at) > NARROW, CLOSING, 0.0)[:, None]
+        area = np.array([self(float(np.exp(own)))[0][0] for own in at[:-1].tolist()])
+        worst = np.where(np.isinf(fall), closing, fall).max(axis=1)
+        worst = worst * np.where(area > AREA_OF_FLOW, BEYOND, 1.0)
+        loads = []
+        for k in np.argsort(-worst, kind="stable"):
+            if worst[k] < STEEP:
+                break
+            between = x[(x > at[k]) & (x < at[k + 1])]
+            middle = between[between.size // 2] if between.size else at[k : k + 2].mean()
+            loads.append(float(middle))
+        return loads
 
 
 def _widest(force: FloatArray, area: FloatArray) -> float | None:

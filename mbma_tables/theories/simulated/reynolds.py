@@ -1,26 +1,31 @@
 """Flow through the gaps of a contact: Reynolds' equation div(h^3 grad p) = 0 on a grid of gaps.
 
 The grid is periodic, or continued by its mirror images. Finite volumes with the harmonic mean of
-h^3 at faces; mean pressure gradients along both axes share one sparse factorisation. Closed gaps
-are found by labelling connected gaps, not by a small conductance.
+h^3 at faces; mean pressure gradients along both axes share one sparse factorisation, in the order
+of nested dissection of the grid. Closed gaps are found by labelling connected gaps, not by a small
+conductance.
 """
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import label
 from scipy.sparse import coo_array, diags_array
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse.linalg import splu
 
 from mbma_tables.common.arguments import FloatArray, finite_array, require
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.interrupts import interruptible
+from mbma_tables.common.interrupts import at_once, interruptible
 
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int_]
+LEAF = 4  # points along the sides of parts of the grid that are not dissected further
+# points of a grid up to which two factorisations at a time fit in memory, 0.3 GB each
+AT_ONCE = 2**19
 
 
 class Faces(NamedTuple):
@@ -126,9 +131,10 @@ def flow_tensor(
     if not mirrored:
         K, _ = _solved(values, sizes)
         return np.array([K[0, 0], K[1, 1], K[0, 1]])
-    along_x = _between_mirrors(values, sizes, 0)
-    along_y = _between_mirrors(values, sizes, 1)
-    return np.array([along_x, along_y, 0.0])
+    both = [functools.partial(_between_mirrors, values, sizes, axis) for axis in (0, 1)]
+    if values.size <= AT_ONCE:
+        return np.array([*at_once(both), 0.0])
+    return np.array([*(along() for along in both), 0.0])
 
 
 def flow_and_couette(
@@ -180,13 +186,48 @@ def _steps(gap: FloatArray, sizes: tuple[float, float]) -> list[float]:
     return [side / points for side, points in zip(sizes, gap.shape, strict=True)]
 
 
-def _factors(
-    faces: list[Faces], of_ends: FloatArray | float, free: IntArray | None
-) -> SuperLU:
-    """Factors of the matrix that gives flows out of points by their pressures.
+@functools.lru_cache(4)
+def _order(shape: tuple[int, int]) -> IntArray:
+    """Points of a periodic grid in the order of nested dissection.
 
-    `of_ends` are conductances to the ends, on the diagonal; only the rows of `free` points are
-    kept, if these are given.
+    The last ones are those on the line between two halves, and so on in each half, so that
+    little is filled in where points are eliminated in this order.
+    """
+    number = np.arange(shape[0] * shape[1]).reshape(shape)
+    parts: list[IntArray] = []
+
+    def dissect(part: IntArray) -> None:
+        if max(part.shape) <= LEAF:
+            parts.append(part.ravel())
+            return
+        long = part if part.shape[0] >= part.shape[1] else part.T
+        middle = long.shape[0] // 2
+        dissect(long[:middle])
+        dissect(long[middle + 1 :])
+        parts.append(long[middle])
+
+    # the last row and column are between a periodic grid's cells
+    dissect(number[:-1, :-1])
+    order = np.concatenate([*parts, number[-1], number[:-1, -1]])
+    order.flags.writeable = False
+    return order
+
+
+def _in_order(number: IntArray) -> IntArray:
+    """Numbers of open points in the order in which they are eliminated."""
+    numbers = number.ravel()[_order(number.shape)]
+    return numbers[numbers >= 0]
+
+
+def _solution(
+    faces: list[Faces],
+    of_ends: FloatArray | float,
+    kept: IntArray,
+    flow: FloatArray,
+) -> FloatArray:
+    """Pressures of the points `kept`, in this order, of which these flow out; others have none.
+
+    `of_ends` are conductances to the ends, on the diagonal.
     """
     near = np.concatenate([along.near for along in faces])
     far = np.concatenate([along.far for along in faces])
@@ -194,20 +235,20 @@ def _factors(
     places = np.append(near, far), np.append(far, near)
     matrix = coo_array((-np.append(conductance, conductance), places))
     matrix = matrix - diags_array(matrix.sum(axis=1) - of_ends)
-    compressed = matrix.tocsc()
-    if free is not None:
-        compressed = compressed[free][:, free]
+    compressed = matrix.tocsc()[kept][:, kept]
 
-    def factorised() -> SuperLU:
-        return splu(
+    def solved() -> FloatArray:
+        # factors are made and freed in one thread: scipy does not free those of another one
+        factors = splu(
             compressed,
-            permc_spec="MMD_AT_PLUS_A",
+            permc_spec="NATURAL",
             diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},
         )
+        return np.asarray(factors.solve(flow[kept]))
 
     # seconds for a large map
-    return interruptible(factorised)
+    return interruptible(solved)
 
 
 def _net(faces: Faces, flow: FloatArray, count: int) -> FloatArray:
@@ -231,7 +272,7 @@ def _solved(gap: FloatArray, sizes: tuple[float, float]) -> tuple[FloatArray, Fl
     if not any(along):
         return np.zeros((2, 2)), np.zeros(2)
     steps = _steps(gap, sizes)
-    _, faces = _faces(gap, owner > 0, steps)
+    number, faces = _faces(gap, owner > 0, steps)
     count = int(np.count_nonzero(owner))
     # net flow out of points, by a uniform pressure gradient and by sliding, along both axes
     forces = np.zeros((count, 2))
@@ -248,8 +289,9 @@ def _solved(gap: FloatArray, sizes: tuple[float, float]) -> tuple[FloatArray, Fl
         uniform[axis] = conductance.sum() * steps[axis] ** 2
     # pressure is free by a constant in each connected gap: one point of each has none
     _, first_points = np.unique(owner[owner > 0], return_index=True)
-    free = np.delete(np.arange(count), first_points)
-    pressure = _factors(faces, 0.0, free).solve(forces[free])
+    free = _in_order(number)
+    free = free[~np.isin(free, first_points)]
+    pressure = _solution(faces, 0.0, free, forces)
     area = sizes[0] * sizes[1]
     K = (np.diag(uniform) - forces[free].T @ pressure) / area
     couette = (mean - np.sum(carried[free] * pressure, axis=0)) / area
@@ -277,5 +319,6 @@ def _between_mirrors(gap: FloatArray, sizes: tuple[float, float], axis: int) -> 
         half = 2 * gap_at_end**3 * steps[1 - axis] / steps[axis]
         ends.append(np.bincount(number_at_end[open_at_end], half, count).astype(float))
     first_end, last_end = ends
-    pressure = _factors(faces, first_end + last_end, None).solve(last_end)
-    return float(first_end @ pressure * sizes[axis] / sizes[1 - axis])
+    order = _in_order(number)
+    pressure = _solution(faces, first_end + last_end, order, last_end)
+    return float(first_end[order] @ pressure * sizes[axis] / sizes[1 - axis])
