@@ -13,7 +13,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib import metadata
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 import numpy as np
@@ -29,7 +29,7 @@ from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.files import write_file
 from mbma_tables.core import core
-from mbma_tables.design.scenes.plan import UNIT, Row
+from mbma_tables.design.scenes.plan import UNIT
 from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry
 from mbma_tables.islands.island_models import ISLAND_MODELS, answer_islands
@@ -38,6 +38,20 @@ from mbma_tables.tables.certificate import phi
 from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma.closed_forms import FormulaModel
 from mbma_tables.theories.mbma.models import get_model
+
+
+class Row(NamedTuple):
+    """One measurement: method, task, largest relative error, time and evaluations."""
+
+    island_model: str
+    variant: str  # "gap rtol=1e-06", "island", "open"
+    quantity: str  # "both", or "pressure" that a law is inverted for
+    error: float | None
+    # time over that of the fixed work; seconds in the row of island model `UNIT`
+    cost: float
+    # islands for a gap, pressures for an exact island, height integrals for a table
+    evaluations: float | None = None
+
 
 # random islands: lowest and highest H, log10 zeta_1, log10 delta/h_rms
 ISLANDS = 1000

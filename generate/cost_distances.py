@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -23,9 +23,28 @@ from generate.files import ROOT, read_csv, to_csv
 from generate.timing import measure
 from mbma_tables import Surface, contact, contact_law
 from mbma_tables.common.arguments import FloatArray
-from mbma_tables.design.scenes.plan import Distance
 from mbma_tables.theories import Mbma, Persson, Theory
 from mbma_tables.theories.calibrated.formulas import Spectrum, SpectrumLaw, area
+
+
+class Distance(NamedTuple):
+    """A method for a theory: its cost, and the theory's deviation from boundary elements.
+
+    Deviations are those on held-out surfaces: root mean squares of ln(theory/simulation), of area
+    at equal force and of force at equal mean separation, light at 1-10% contact and deep at 10-97%.
+    """
+
+    theory: str
+    way: str
+    cost: float  # cost of a point, over that of the fixed work
+    once: float  # cost of preparing a surface
+    area_light: float
+    area_deep: float
+    force_light: float
+    force_deep: float
+    reached_light: float  # share of simulated loads that the theory reaches
+    reached_deep: float
+
 
 SIMULATED = "boundary elements"
 # of each timed surface, in one call

@@ -15,6 +15,7 @@ from mbma_tables.cli.format import Report, column_unit, columns_of, report_answe
 from mbma_tables.common.arguments import finite_array
 from mbma_tables.common.distributions import distribution_of
 from mbma_tables.common.errors import InputError, MbmaError
+from mbma_tables.common.files import shipped_file
 from mbma_tables.common.progress import echo
 from mbma_tables.contacts.quantities.gas import GASES, VACUUM
 from mbma_tables.contacts.quantities.registry import unit_of
@@ -450,16 +451,16 @@ def cost_command(distance: bool, as_json: bool) -> None:
 
     Example: mbma cost --distance
     """
-    from mbma_tables.design.scenes.plan import UNIT, shipped_costs, shipped_distances
+    from mbma_tables.design.scenes.plan import UNIT, measurements, shipped_costs
 
     costs = shipped_costs()
-    rows: Any = (
-        shipped_distances()
-        if distance
-        else [row for row in costs.rows if row.island_model != UNIT]
-    )
+    rows = measurements(shipped_file("distance.csv")) if distance else costs.rows
     unit = costs.seconds
-    records = [row._asdict() | {"seconds": row.cost * unit} for row in rows]
+    records = [
+        row | {"seconds": row["cost"] * unit}
+        for row in rows
+        if row.get("island_model") != UNIT
+    ]
     if as_json:
         echo(to_json({"unit_seconds": unit, "rows": records}))
         return

@@ -51,34 +51,12 @@ UNIT = "unit"
 TEXTS = ("island_model", "variant", "quantity", "theory", "way")  # text fields
 
 
-class Row(NamedTuple):
-    """One measurement: method, task, largest relative error, time and evaluations."""
-
-    island_model: str
-    variant: str  # "gap rtol=1e-06", "island", "open"
-    quantity: str  # "both", or "pressure" that a law is inverted for
-    error: float | None
-    # time over that of the fixed work; seconds in the row of island model `UNIT`
-    cost: float
-    # islands for a gap, pressures for an exact island, height integrals for a table
-    evaluations: float | None = None
-
-    @property
-    def what(self) -> str:
-        """The variant without its tolerance."""
-        return self.variant.partition(" rtol=")[0]
-
-    @property
-    def rtol(self) -> float | None:
-        """The requested tolerance, if the variant contains one."""
-        _, separator, text = self.variant.partition(" rtol=")
-        return float(text) if separator else None
-
-
 class Costs(NamedTuple):
     """All measurements of a file, and the seconds of the fixed work where they were made."""
 
-    rows: tuple[Row, ...]
+    # a measurement each: island model, variant such as "gap rtol=1e-06", quantity, error,
+    # cost over that of the fixed work, and evaluations
+    rows: tuple[dict[str, Any], ...]
     seconds: float
 
     def of(self, island_model: str, what: str, rtol: float | None = None) -> float:
@@ -86,12 +64,13 @@ class Costs(NamedTuple):
 
         NaN if none was measured.
         """
-        # calls and opening a table have one row, without a tolerance
-        by_rtol = sorted(
-            (row.rtol or 0.0, row.cost)
-            for row in self.rows
-            if row.island_model == island_model and row.what == what
-        )
+        by_rtol = []
+        for row in self.rows:
+            measured, _, of_row = row["variant"].partition(" rtol=")
+            if (row["island_model"], measured) == (island_model, what):
+                # calls and opening a table have one row, without a tolerance
+                by_rtol.append((float(of_row or 0.0), row["cost"]))
+        by_rtol.sort()
         # decimal tolerances of a file and of a product may differ by roundoff
         limit = math.inf if rtol is None else rtol * (1 + 1e-9)
         costs = [cost for measured_rtol, cost in by_rtol if measured_rtol <= limit]
@@ -99,50 +78,22 @@ class Costs(NamedTuple):
         return self.seconds * (costs or tightest or [math.nan])[-1]
 
 
-class Distance(NamedTuple):
-    """A method for a theory: its cost, and the theory's deviation from boundary elements.
-
-    Deviations are those on held-out surfaces: root mean squares of ln(theory/simulation), of area
-    at equal force and of force at equal mean separation, light at 1-10% contact and deep at 10-97%.
-    """
-
-    theory: str
-    way: str
-    cost: float  # cost of a point, over that of the fixed work
-    once: float  # cost of preparing a surface
-    area_light: float
-    area_deep: float
-    force_light: float
-    force_deep: float
-    reached_light: float  # share of simulated loads that the theory reaches
-    reached_deep: float
-
-
-def _cell(column: str, text: str) -> str | float | None:
-    """Content of a cell of a CSV file; an empty one is no number."""
-    if column in TEXTS:
-        return text
-    return float(text) if text else None
-
-
-def _rows(kind: Any, path: pathlib.Path) -> tuple[Any, ...]:
-    """Rows of a CSV file whose columns are the fields of a kind."""
-    return tuple(
-        kind(**{column: _cell(column, text) for column, text in record.items()})
-        for record in records(path)
-    )
-
-
-@functools.cache
-def shipped_distances() -> tuple[Distance, ...]:
-    """The distances that ship with the library."""
-    return _rows(Distance, shipped_file("distance.csv"))
+def measurements(path: pathlib.Path) -> tuple[dict[str, Any], ...]:
+    """Rows of a file of measurements by column: texts, and numbers, None where a cell is empty."""
+    rows = []
+    for record in records(path):
+        row: dict[str, Any] = dict(record)
+        for column, text in record.items():
+            if column not in TEXTS:
+                row[column] = float(text) if text else None
+        rows.append(row)
+    return tuple(rows)
 
 
 def read_costs(path: pathlib.Path) -> Costs:
     """Costs from a CSV file."""
-    rows = _rows(Row, path)
-    (seconds,) = (row.cost for row in rows if row.island_model == UNIT)
+    rows = measurements(path)
+    (seconds,) = (row["cost"] for row in rows if row["island_model"] == UNIT)
     return Costs(rows, seconds)
 
 

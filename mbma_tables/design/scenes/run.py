@@ -22,7 +22,6 @@ from mbma_tables.contacts.quantities.declaration import of_yielding_contacts
 from mbma_tables.contacts.quantities.registry import registry, unit_of
 from mbma_tables.contacts.question import both_separations
 from mbma_tables.design.scenes.plan import AMPLIFICATION, LEAKAGE, Plan, Step
-from mbma_tables.islands.island_models import RigidModel
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.self_affine import PARAMETERS
 from mbma_tables.tables.open import open_islands
@@ -211,64 +210,35 @@ def hertz_area(run: Run, step: Step) -> None:
 
 def island_statistics(run: Run, step: Step) -> None:
     """Number of islands at every gap; load, area, density along their approach (Eqs. 40, 42)."""
-    from mbma_tables.theories.mbma.island import islands_of, loads_of
-    from mbma_tables.theories.mbma.profile import profile, shape_of, source_of
+    from mbma_tables.theories.mbma.sums import distribution
 
-    surface = run.surface
-    shape = shape_of(surface)
-    model, variant, rtol, outside = run.summing(step).sums
-    h_rms = float(surface.h_rms)
-    depth = np.asarray(surface.h_max - run.gap) / h_rms
-    source = source_of(shape, variant)
-    deepest = max(float(depth.max()), 0.0)
-    # approaches up to the deepest, graded towards first contact
-    fraction = np.linspace(0, 1, run.scene.points + 1)[1:]
-    stretched = fraction * np.arcsinh(np.sqrt(deepest / source.layer))
-    delta = source.layer * np.sinh(stretched) ** 2
-    # where no gap touches there is no distribution
-    number = np.zeros(depth.size)
-    density = np.zeros((depth.size, delta.size))
-    force, area, error = np.zeros((3, delta.size))
-    if deepest > 0:
-        # islands are counted without an island model
-        counted = profile(shape, RigidModel(), variant, rtol, rows=3)
-        groups, s, q0 = islands_of(surface, delta * h_rms, variant)
-        number[depth > 0] = counted.totals(depth[depth > 0])[2] * q0**2
-        force, area, error = loads_of(model, groups, s, q0, outside)
-        error = np.maximum(error, counted.error)
-        # without the area of smaller scales, all of the summit's area is in contact: eta = 1
-        if "subscale_area" in run.scene.without:
-            area = area / groups["eta"]
-        shift, rate = source.heights(groups, delta)
-        spread = source.density(groups, delta, shift - rate * depth[:, None])
-        # no island approaches further than the highest one
-        density = np.where(delta <= depth[:, None], spread, 0.0) * q0**2 / s
-    run.keep("island_number", number)
-    run.keep("island_delta", delta * h_rms, "approach")
-    run.keep("island_force", float(run.scene.in_units.E_star) * force, "approach")
-    run.keep("island_area", area, "approach")
-    run.keep("island_density", density, "gap", "approach")
-    run.errors[step.name] = float(np.max(error))
+    # without the area of smaller scales, all of the summit's area is in contact: eta = 1
+    of_summits = "subscale_area" in run.scene.without
+    how = run.summing(step).sums
+    found = distribution(run.surface, run.gap, run.scene.points, how, of_summits)
+    found["force"] = float(run.scene.in_units.E_star) * found["force"]
+    run.errors[step.name] = float(np.max(found.pop("error")))
+    run.keep("island_number", found.pop("number"))
+    run.keep("island_density", found.pop("density"), "gap", "approach")
+    for name, values in found.items():
+        run.keep(f"island_{name}", values, "approach")
 
 
 def profiles(run: Run, step: Step) -> None:
     """p(r) and d(r) of the islands at these approaches, solved exactly (Eqs. 34, 36, 37)."""
-    from mbma_tables.islands import greenwood_tripp
-    from mbma_tables.theories.mbma.island import islands_of
+    from mbma_tables.theories.mbma.island import profiles_of
 
-    delta = np.ravel(run.scene.deltas)
     theory = run.summing(step)
-    groups, s, q0 = islands_of(run.surface, delta, theory.variant)
-    sigma = groups["sigma"]
-    solved = greenwood_tripp.solve(groups["X"], groups["mu"], rtol=theory.rtol)
-    radius = np.sqrt(2 * groups["R_d"] * sigma)
-    stress = float(run.scene.in_units.E_star) * q0 * s * sigma / radius
+    delta = np.ravel(run.scene.deltas)
+    radius, pressure, gap, error = profiles_of(
+        run.surface, delta, theory.variant, theory.rtol
+    )
     nodes = ("island", "node")
     run.keep("profile_delta", delta, "island")
-    run.keep("profile_radius", solved.rho * radius[:, None] / q0, *nodes)
-    run.keep("profile_pressure", stress[:, None] * solved.pressure, *nodes)
-    run.keep("profile_gap", solved.gap * sigma[:, None] * s, *nodes)
-    run.errors[step.name] = float(np.max(solved.error))
+    run.keep("profile_radius", radius, *nodes)
+    run.keep("profile_pressure", float(run.scene.in_units.E_star) * pressure, *nodes)
+    run.keep("profile_gap", gap, *nodes)
+    run.errors[step.name] = error
 
 
 def comparison(run: Run, step: Step) -> None:

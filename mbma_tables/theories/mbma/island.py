@@ -20,6 +20,7 @@ from mbma_tables.common.arguments import (
 )
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import modulus_and_units
+from mbma_tables.islands import greenwood_tripp
 from mbma_tables.islands.geometry import geometry, measured_islands
 from mbma_tables.islands.island_models import (
     AnyModel,
@@ -173,6 +174,26 @@ def loads_of(
     phi = answer_islands(model, g, outside)
     force = s / q0 * scale_force(g) * phi.phi_F
     return force, scale_area(g) * phi.phi_A / q0**2, phi.error
+
+
+def profiles_of(
+    surface: AnySurface, delta: FloatArray, variant: Variant, rtol: float
+) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """r [length], p(r) over E* and d(r) [length] in islands at approaches (Eqs. 34, 36, 37), and their error.
+
+    Each of shape (islands, nodes); solved exactly.
+    """
+    g, s, q0 = islands_of(surface, delta, variant)
+    sigma = g["sigma"]
+    solved = greenwood_tripp.solve(g["X"], g["mu"], rtol=rtol)
+    radius = np.sqrt(2 * g["R_d"] * sigma)
+    stress = q0 * s * sigma / radius
+    return (
+        solved.rho * radius[:, None] / q0,
+        stress[:, None] * solved.pressure,
+        solved.gap * sigma[:, None] * s,
+        float(np.max(solved.error)),
+    )
 
 
 def check_band(surface: Any, variant: Variant) -> None:

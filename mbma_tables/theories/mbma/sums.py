@@ -19,7 +19,7 @@ from mbma_tables.common.errors import ConvergenceError, MbmaError, OutOfRangeErr
 from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.shared import shared
 from mbma_tables.core import OK, UNRESOLVED, core
-from mbma_tables.islands.island_models import AnyModel, exact_model
+from mbma_tables.islands.island_models import AnyModel, RigidModel, exact_model
 from mbma_tables.islands.variants import Variant
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.banded import BandedSurface
@@ -28,7 +28,8 @@ from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.tables.island4d import Island4dModel
 from mbma_tables.tables.universal import UniversalModel
 from mbma_tables.theories.base import Solved
-from mbma_tables.theories.mbma.profile import Shape, profile
+from mbma_tables.theories.mbma.island import islands_of, loads_of
+from mbma_tables.theories.mbma.profile import Shape, profile, shape_of, source_of
 
 QUADRATURE_SHARE = 0.9  # of the requested tolerance; a table's own error comes on top
 BLOCK = 256  # pairs between two checks for interrupts
@@ -318,3 +319,53 @@ def _not_covered(
     if isinstance(why, ConvergenceError):
         return ConvergenceError(message, mask)
     return OutOfRangeError(message, mask)
+
+
+def distribution(
+    surface: MeasuredSurface,
+    gap: FloatArray,
+    points: int,
+    how: Sums,
+    of_summits: bool = False,
+) -> dict[str, FloatArray]:
+    """Islands of one surface at gaps d, shape (n,): their number, and how they are distributed (Eqs. 40, 42).
+
+    Approaches `delta` are `points` up to the deepest, graded towards first contact, with
+    the `force` over E* and `area` of an island there, their `error`, and by gap and
+    approach the `density`; `number` is per nominal area. With `of_summits` all of a
+    summit's area is in contact, eta = 1.
+    """
+    shape = shape_of(surface)
+    h_rms = float(surface.h_rms)
+    depth = np.asarray(surface.h_max - gap) / h_rms
+    source = source_of(shape, how.variant)
+    deepest = max(float(depth.max()), 0.0)
+    fraction = np.linspace(0, 1, points + 1)[1:]
+    stretched = fraction * np.arcsinh(np.sqrt(deepest / source.layer))
+    delta = source.layer * np.sinh(stretched) ** 2
+    # where no gap touches there is no distribution
+    number = np.zeros(depth.size)
+    density = np.zeros((depth.size, delta.size))
+    force, area, error = np.zeros((3, delta.size))
+    if deepest > 0:
+        # islands are counted without an island model
+        counted = profile(shape, RigidModel(), how.variant, how.rtol, rows=3)
+        groups, s, q0 = islands_of(surface, delta * h_rms, how.variant)
+        number[depth > 0] = counted.totals(depth[depth > 0])[2] * q0**2
+        force, area, error = loads_of(how.model, groups, s, q0, how.outside)
+        error = np.maximum(error, counted.error)
+        if of_summits:
+            area = area / groups["eta"]
+        shift, rate = source.heights(groups, delta)
+        spread_of_heights = source.density(groups, delta, shift - rate * depth[:, None])
+        # no island approaches further than the highest one
+        is_reached = delta <= depth[:, None]
+        density = np.where(is_reached, spread_of_heights, 0.0) * q0**2 / s
+    return {
+        "number": number,
+        "density": density,
+        "delta": delta * h_rms,
+        "force": force,
+        "area": area,
+        "error": error,
+    }
