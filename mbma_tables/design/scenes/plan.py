@@ -64,7 +64,7 @@ class Costs(NamedTuple):
 
         NaN if none was measured.
         """
-        by_rtol = []
+        by_rtol: list[tuple[float, float]] = []
         for row in self.rows:
             measured, _, of_row = row["variant"].partition(" rtol=")
             if (row["island_model"], measured) == (island_model, what):

@@ -322,7 +322,7 @@ def _not_covered(
 
 
 def distribution(
-    surface: MeasuredSurface,
+    surface: AnySurface,
     gap: FloatArray,
     points: int,
     how: Sums,
