@@ -291,30 +291,26 @@ static bool coefficients_end(size_t count, size_t cells, size_t axes, size_t out
     return start >= 0 && (size_t)start <= count && count - (size_t)start == size;
 }
 
-static bool do_cell_answers(const argument *a, long long *answer) {
-    enum { AXES, EXPONENTIAL, BRANCHES, MIDDLES, STARTS, TERMS, COEFFICIENTS, BOUNDS, X };
-    enum { VALUES = X + 1, WITH_SLOPES, SLOPES, ERRORS, CELLS };
-    enum { AXIS_NUMBERS = 7, LOW = 0, HIGH, OFFSET, FIRST, LAST, IS_LOG, OUTSIDE };
-    const size_t axes = a[AXES].count / AXIS_NUMBERS, outputs = a[EXPONENTIAL].count;
-    const size_t cells = a[STARTS].count;
-    if (axes < 1 || axes > MBMA_MAX_AXES || a[AXES].count != axes * AXIS_NUMBERS || outputs < 1)
-        return false;
-    if (a[BRANCHES].count != 2 * a[MIDDLES].count || a[TERMS].count != cells * axes ||
-        a[BOUNDS].count != cells * outputs)
-        return false;
-    if (!coefficients_end(a[COEFFICIENTS].count, cells, axes, outputs, a[STARTS].items,
-                          a[TERMS].items))
-        return false;
-    const size_t n = a[X].count / axes;
-    if (a[X].count != n * axes || a[VALUES].count != n * outputs || a[ERRORS].count != n * outputs ||
-        a[CELLS].count != n)
-        return false;
-    const bool slopes = a[WITH_SLOPES].whole != 0;
-    if (a[SLOPES].count != (slopes ? n * outputs * axes : 0))
-        return false;
+/* The first arguments of functions of a table: its axes, outputs, tree and polynomials. */
+enum { CELL_AXES, CELL_EXPONENTIAL, CELL_BRANCHES, CELL_MIDDLES, CELL_STARTS, CELL_TERMS };
+enum { CELL_COEFFICIENTS = CELL_TERMS + 1, CELL_BOUNDS, CELL_X };
+#define CELL_TABLE "D J J D L J D D "
 
-    const double *const numbers = a[AXES].items;
-    mbma_axis axis[MBMA_MAX_AXES];
+/* The table of these arguments, whose axes are written to `axis`; false where they do not fit together. */
+static bool is_cell_table(const argument *a, mbma_axis *axis, mbma_cell_table *table) {
+    enum { AXIS_NUMBERS = 7, LOW = 0, HIGH, OFFSET, FIRST, LAST, IS_LOG, OUTSIDE };
+    const size_t axes = a[CELL_AXES].count / AXIS_NUMBERS, outputs = a[CELL_EXPONENTIAL].count;
+    const size_t cells = a[CELL_STARTS].count;
+    if (axes < 1 || axes > MBMA_MAX_AXES || a[CELL_AXES].count != axes * AXIS_NUMBERS ||
+        outputs < 1)
+        return false;
+    if (a[CELL_BRANCHES].count != 2 * a[CELL_MIDDLES].count ||
+        a[CELL_TERMS].count != cells * axes || a[CELL_BOUNDS].count != cells * outputs)
+        return false;
+    if (!coefficients_end(a[CELL_COEFFICIENTS].count, cells, axes, outputs, a[CELL_STARTS].items,
+                          a[CELL_TERMS].items))
+        return false;
+    const double *const numbers = a[CELL_AXES].items;
     for (size_t k = 0; k < axes; k++) {
         const double *const of_axis = numbers + k * AXIS_NUMBERS;
         axis[k] = (mbma_axis){
@@ -329,24 +325,64 @@ static bool do_cell_answers(const argument *a, long long *answer) {
                                                  : MBMA_REFUSED,
         };
     }
-    const mbma_cell_table table = {
+    *table = (mbma_cell_table){
         .axes = axes,
         .outputs = outputs,
-        .boxes = a[MIDDLES].count,
+        .boxes = a[CELL_MIDDLES].count,
         .cells = cells,
-        .coefficient_count = a[COEFFICIENTS].count,
+        .coefficient_count = a[CELL_COEFFICIENTS].count,
         .axis = axis,
-        .is_exponential = a[EXPONENTIAL].items,
-        .branches = a[BRANCHES].items,
-        .terms = a[TERMS].items,
-        .starts = a[STARTS].items,
-        .middles = a[MIDDLES].items,
-        .coefficients = a[COEFFICIENTS].items,
-        .errors = a[BOUNDS].items,
+        .is_exponential = a[CELL_EXPONENTIAL].items,
+        .branches = a[CELL_BRANCHES].items,
+        .terms = a[CELL_TERMS].items,
+        .starts = a[CELL_STARTS].items,
+        .middles = a[CELL_MIDDLES].items,
+        .coefficients = a[CELL_COEFFICIENTS].items,
+        .errors = a[CELL_BOUNDS].items,
     };
-    *answer = (long long)mbma_cell_answers(&table, n, a[X].items, a[VALUES].items,
+    return true;
+}
+
+static bool do_cell_answers(const argument *a, long long *answer) {
+    enum { VALUES = CELL_X + 1, WITH_SLOPES, SLOPES, ERRORS, CELLS };
+    mbma_axis axis[MBMA_MAX_AXES];
+    mbma_cell_table table;
+    if (!is_cell_table(a, axis, &table))
+        return false;
+    const size_t n = a[CELL_X].count / table.axes, values = n * table.outputs;
+    if (a[CELL_X].count != n * table.axes || a[VALUES].count != values ||
+        a[ERRORS].count != values || a[CELLS].count != n)
+        return false;
+    const bool slopes = a[WITH_SLOPES].whole != 0;
+    if (a[SLOPES].count != (slopes ? values * table.axes : 0))
+        return false;
+    *answer = (long long)mbma_cell_answers(&table, n, a[CELL_X].items, a[VALUES].items,
                                            slopes ? a[SLOPES].items : NULL, a[ERRORS].items,
                                            a[CELLS].items);
+    return true;
+}
+
+static bool do_cell_inverse(const argument *a, long long *answer) {
+    enum { OUTPUT = CELL_BOUNDS + 1, AXIS, RISES, GUESS, WANTED, X, SLOPES, ERRORS, CELLS };
+    mbma_axis axis[MBMA_MAX_AXES];
+    mbma_cell_table table;
+    if (!is_cell_table(a, axis, &table))
+        return false;
+    const size_t n = a[WANTED].count, guesses = table.boxes * (2 * table.axes + 1);
+    const bool has_guess = a[GUESS].count > 0;
+    if (a[OUTPUT].whole < 0 || (size_t)a[OUTPUT].whole >= table.outputs || a[AXIS].whole < 0 ||
+        (size_t)a[AXIS].whole >= table.axes || (has_guess && a[GUESS].count != guesses) ||
+        a[X].count != n * table.axes || a[SLOPES].count != n || a[ERRORS].count != n ||
+        a[CELLS].count != n)
+        return false;
+    const mbma_cell_inverse_of of = {
+        .output = (size_t)a[OUTPUT].whole,
+        .axis = (size_t)a[AXIS].whole,
+        .rises = a[RISES].whole != 0,
+        .guess = has_guess ? a[GUESS].items : NULL,
+    };
+    *answer = (long long)mbma_cell_inverse(&table, n, &of, a[WANTED].items, a[X].items,
+                                           a[SLOPES].items, a[ERRORS].items, a[CELLS].items);
     return true;
 }
 
@@ -1014,7 +1050,8 @@ static bool do_yielding_planes(const argument *a, long long *answer) {
     FN(island_places, "Dn Dn Dn Dn D8 wn wn wn wn wn wn wn") \
     FN(island_answers, "Dn Dn Dn Dn Dn " ISLAND_TABLE "wn wn wn") \
     FN(island_totals, "Dn Dn Dn Dn d D8 " ISLAND_TABLE "w4n wn bn l1") \
-    FN(cell_answers, "D J J D L J D D D w i w w l") \
+    FN(cell_answers, CELL_TABLE "D w i w w l") \
+    FN(cell_inverse, CELL_TABLE "i i i D D w w w l") \
     FN(profile_islands, "Dn d d d D8 " TABLE "w4n w1") \
     FN(profile_missed, PANELS "d wn") \
     FN(profile_series, PANELS "w wn w wm wm l") \

@@ -12,6 +12,7 @@ MBMA_INLINE four four_of(const double *row) { return _mm256_loadu_pd(row); }
 MBMA_INLINE four four_of_floats(const float *row) { return _mm256_cvtps_pd(_mm_loadu_ps(row)); }
 MBMA_INLINE four fma4(four a, double y, four b) { return _mm256_fmadd_pd(a, _mm256_set1_pd(y), b); }
 MBMA_INLINE four fma44(four a, four b, four c) { return _mm256_fmadd_pd(a, b, c); }
+MBMA_INLINE four minus4(four a, four b) { return _mm256_sub_pd(a, b); }
 MBMA_INLINE void four_to(double *row, four a) { _mm256_storeu_pd(row, a); }
 #else
 typedef struct {
@@ -35,6 +36,11 @@ MBMA_INLINE four fma44(four a, four b, four c) {
     for (int i = 0; i < 4; i++)
         c.lane[i] = mbma_fma(a.lane[i], b.lane[i], c.lane[i]);
     return c;
+}
+MBMA_INLINE four minus4(four a, four b) {
+    for (int i = 0; i < 4; i++)
+        a.lane[i] -= b.lane[i];
+    return a;
 }
 MBMA_INLINE void four_to(double *row, four a) { memcpy(row, &a, sizeof a); }
 #endif

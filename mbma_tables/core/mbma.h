@@ -156,6 +156,24 @@ typedef struct {
 size_t mbma_cell_answers(const mbma_cell_table *table, size_t n, const double *x, double *values, double *slopes,
                          double *errors, int64_t *cells);
 
+/* What is solved for: an output that rises, or falls, along an axis everywhere. `guess` may be NULL; for each box that
+ * is halved along the axis it has a polynomial that is close to the stored output at the middle: what the coordinates
+ * of all axes are times, then their squares, then a constant. */
+typedef struct {
+    size_t output, axis;
+    int rises;
+    const double *guess;
+} mbma_cell_inverse_of;
+
+enum { MBMA_NO_CELL = -1, MBMA_NOT_REACHED = -2 }; /* in place of numbers of cells */
+
+/* Where an output is `wanted` (n): column `axis` of `x` (n, axes) is written, the others are read. `slopes` (n) are
+ * those of the output by x there, so that the bound on the error of x is that of the output over the slope, and `errors`
+ * (n) as of mbma_cell_answers; NaN where the table has no answer or does not reach the output, as `cells` (n) say, and
+ * how many these are. */
+size_t mbma_cell_inverse(const mbma_cell_table *table, size_t n, const mbma_cell_inverse_of *of, const double *wanted,
+                         double *x, double *slopes, double *errors, int64_t *cells);
+
 /* ---- profile.c: one surface at many gaps ------------------------------------------------------------------------ */
 
 enum { MBMA_PANEL_NODES = 16, MBMA_PANEL_CHECKS = 3, MBMA_PANEL_GAPS = 10, MBMA_PANEL_ROWS = 4 };

@@ -20,7 +20,7 @@ from mbma_tables.common.arguments import (
     require,
 )
 from mbma_tables.common.display import Variable, dataset_of
-from mbma_tables.common.errors import ConvergenceError, InputError
+from mbma_tables.common.errors import InputError
 from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.netcdf import opened, own_content
 from mbma_tables.common.shared import frozen, shared_property
@@ -41,11 +41,9 @@ MOST_AXES = 6
 OUTSIDE = ("raise", "nan", "nearest", "periodic")  # policies of an axis
 IN_CORE = {"raise": 0, "nan": 0, "nearest": 1, "periodic": 2}  # as in mbma.h
 BLOCK = 1 << 14  # points between two checks for Ctrl-C
-STEPS = 80  # of an inverse
+NOT_REACHED = -2  # of an inverse, as in mbma.h
 NUMBERS = ("axis_numbers", "output_numbers")
 ROUNDING = 4e-15
-LAST_STEP = 1e-9  # of an inverse, over the width of the cell
-SOLVED = 1e-15  # relative, of an inverse; of a logarithm absolute where it is small
 
 
 @dataclasses.dataclass(frozen=True)
@@ -218,21 +216,6 @@ class FunctionTable:
         plain = {n: v for n, v in self.attributes.items() if n != "members"}
         return FunctionTable(self.axes, outputs, self._of_members(slice(None)), plain)
 
-    @shared_property
-    def _alone(self) -> tuple[FunctionTable, ...]:
-        """Each output as a table of its own."""
-        arrays = self.arrays
-        found = []
-        for k, output in enumerate(self.outputs):
-            own = self._some(
-                arrays["coefficients"],
-                arrays["errors"],
-                arrays["conformance_exact"],
-                slice(k, k + 1),
-            )
-            found.append(FunctionTable(self.axes, (output,), own, {}))
-        return tuple(found)
-
     def member(self, name: str) -> FunctionTable:
         """A member as a table of its own.
 
@@ -317,8 +300,8 @@ class FunctionTable:
         return high - low
 
     @shared_property
-    def _ends(self) -> tuple[FloatArray, FloatArray]:
-        """Ends of the cells in coordinates, shape (cells, axes)."""
+    def _box_ends(self) -> tuple[FloatArray, FloatArray]:
+        """Ends of all boxes in coordinates, shape (boxes, axes)."""
         branches = self.arrays["branches"].astype(int)
         middles = self.arrays["middles"]
         low, high = np.empty((2, len(branches), len(self.axes)))
@@ -329,6 +312,13 @@ class FunctionTable:
                 continue
             low[child : child + 2], high[child : child + 2] = low[box], high[box]
             high[child, axis] = low[child + 1, axis] = middles[box]
+        return low, high
+
+    @shared_property
+    def _ends(self) -> tuple[FloatArray, FloatArray]:
+        """Ends of the cells in coordinates, shape (cells, axes)."""
+        branches = self.arrays["branches"]
+        low, high = self._box_ends
         boxes = np.flatnonzero(branches[:, 0] == POLYNOMIAL)
         order = boxes[np.argsort(branches[boxes, 1])]
         return low[order], high[order]
@@ -506,18 +496,24 @@ class FunctionTable:
         return Looked(values, errors, slopes, slope_errors, spread)
 
     def _absolute(self, values: FloatArray, errors: FloatArray) -> FloatArray:
-        """Bounds on absolute errors from those that are stored."""
-        bounds = errors.copy()
-        for k, output in enumerate(self.outputs):
-            size = np.abs(values[:, k])
-            if output.transform == "log":
-                bounds[:, k] = size * np.expm1(errors[:, k])
-            elif output.error == "relative":
-                # of the exact value, which may be larger by its error
-                bounds[:, k] *= np.maximum(size, output.least) / (
-                    1 - np.minimum(errors[:, k], 0.5)
-                )
-        return bounds
+        """Bounds on absolute errors from those that are stored, shape (points, outputs)."""
+        columns = [
+            self._absolute_of(k, values[:, k], errors[:, k])
+            for k in range(len(self.outputs))
+        ]
+        return np.stack(columns, axis=-1)
+
+    def _absolute_of(self, k: int, values: FloatArray, errors: FloatArray) -> FloatArray:
+        """The same of one output."""
+        output = self.outputs[k]
+        size = np.abs(values)
+        if output.transform == "log":
+            return np.asarray(size * np.expm1(errors))
+        if output.error == "relative":
+            # of the exact value, which may be larger by its error
+            size = np.maximum(size, output.least)
+            return np.asarray(errors * size / (1 - np.minimum(errors, 0.5)))
+        return errors.copy()
 
     def _slope_errors(
         self, x: FloatArray, bounds: FloatArray, cells: NDArray[np.int64]
@@ -538,8 +534,7 @@ class FunctionTable:
         return np.asarray(found)
 
     @shared_property
-    def _samples(self) -> tuple[FloatArray, FloatArray]:
-        """Values and slopes by coordinates of the axes, at some points of every cell."""
+    def _directions(self) -> NDArray[np.int64]:
         low, high = self._ends
         places = 0.5 * (1 + tests(len(self.axes)))
         t = low[:, None] + places * (high - low)[:, None]
@@ -547,29 +542,17 @@ class FunctionTable:
             [axis.from_grid(t[..., a]).ravel() for a, axis in enumerate(self.axes)],
             axis=-1,
         )
-        values, slopes, _, _ = self._answers(np.ascontiguousarray(points), True)
-        for a, axis in enumerate(self.axes):
-            slopes[:, :, a] *= axis.by_grid(points[:, a])[:, None]
-        return values, slopes
-
-    @shared_property
-    def _directions(self) -> NDArray[np.int64]:
-        """By output and axis 1 or -1, the sign of all slopes, or 0 where both signs occur."""
-        _, slopes = self._samples
+        slopes = self._answers(np.ascontiguousarray(points), True)[1]
         rises = np.nanmin(slopes, axis=0) > 0
         falls = np.nanmax(slopes, axis=0) < 0
         return np.asarray(rises.astype(int) - falls.astype(int))
 
-    @shared_property
-    def _logarithms(self) -> NDArray[np.bool_]:
-        """By output and axis, whether an inverse is that of the logarithm, which is closer to a line."""
-        values, slopes = self._samples
-        positive = np.nanmin(values, axis=0) > 0
-        with np.errstate(divide="ignore", invalid="ignore"):
-            curved = np.nanstd(slopes, axis=0) / np.abs(np.nanmean(slopes, axis=0))
-            of_log = slopes / values[:, :, None]
-            less = np.nanstd(of_log, axis=0) / np.abs(np.nanmean(of_log, axis=0))
-        return np.asarray(positive[:, None] & (less < curved))
+    def directions(self) -> NDArray[np.int64]:
+        """By output and axis 1 or -1, the sign of all slopes, or 0 where both signs occur.
+
+        Slopes are those at some points of every cell.
+        """
+        return self._directions.copy()
 
     def has_inverse(self, output: str, axis: str) -> bool:
         """Whether an output increases, or decreases, everywhere along an axis."""
@@ -621,87 +604,95 @@ class FunctionTable:
         x, shape = self._points(columns)
         whole = np.broadcast_shapes(shape, wanted.shape)
         index = np.broadcast_to(np.arange(len(x)).reshape(shape), whole).ravel()
-        target = np.broadcast_to(wanted, whole).ravel()
-        is_log = bool(self._logarithms[k, a])
-        found, error = self._alone[k]._solved(x, index, a, direction, target, is_log)
+        target = np.broadcast_to(wanted, whole).flatten()
+        found, error = self._solved(np.ascontiguousarray(x[index]), k, a, target)
         return found.reshape(whole)[()], error.reshape(whole)[()]
 
     def _solved(
+        self, x: FloatArray, k: int, a: int, target: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Where output `k` has these values along axis `a` from the points `x`, and bounds on its error."""
+        count = len(x)
+        slopes, stated = np.empty((2, count))
+        cells = np.empty(count, dtype=np.int64)
+        rises = int(self._directions[k, a] > 0)
+
+        def fill(block: slice) -> None:
+            core.cell_inverse(
+                *self._core,
+                *(k, a, rises, self._guesses[k].ravel(), target[block]),
+                *(x[block].reshape(-1), slopes[block], stated[block], cells[block]),
+            )
+
+        in_blocks(fill, count, BLOCK)
+        missed = cells == NOT_REACHED
+        if missed.any():
+            self._refuse_missed(x, k, a, target, ~missed)
+        found = x[:, a]
+        bound = self._absolute_of(k, target, stated)
+        return found, bound / np.abs(slopes) + ROUNDING * np.abs(found)
+
+    def _refuse_missed(
         self,
         x: FloatArray,
-        index: NDArray[np.int64],
+        k: int,
         a: int,
-        direction: int,
         target: FloatArray,
-        is_log: bool,
-    ) -> tuple[FloatArray, FloatArray]:
-        """Newton's method along axis `a` at some of the points `x`, within ends between which the output reaches `target`."""
-        axis, output = self.axes[a], self.outputs[0]
-        ends = []
-        for end in (axis.low, axis.high)[::direction]:
+        is_reached: NDArray[np.bool_],
+    ) -> None:
+        """Raise the error of values that an output does not reach along an axis."""
+        axis, ends = self.axes[a], []
+        for end in (axis.low, axis.high)[:: int(self._directions[k, a])]:
             x[:, a] = end
-            ends.append(self._answers(x, False)[0][index, 0])
-        good = (target >= ends[0]) & (target <= ends[1])
+            ends.append(self._answers(x, False)[0][:, k])
         limits = f"within {np.nanmin(ends[0]):g} to {np.nanmax(ends[1]):g}"
-        require(
-            output.name,
-            target,
-            good,
-            f"{limits}, which the table reaches along {axis.name}",
-        )
-        low, high = (
-            np.full(target.size, float(axis.to_grid(e))) for e in (axis.low, axis.high)
-        )
-        span = high[0] - low[0]
-        goal, *stored = (np.log(v) if is_log else v for v in (target, *ends))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            part = (goal - stored[0]) / (stored[1] - stored[0])
-        part = np.nan_to_num(part, nan=0.5)
-        t = low + (part if direction > 0 else 1 - part) * span
-        x = x[index]
-        error = np.empty(target.size)
-        active = np.arange(target.size)
-        for _ in range(STEPS):
-            points = x[active]
-            points[:, a] = axis.from_grid(t[active])
-            values, slopes, stated, cells = self._answers(points, True)
-            value, by_x = values[:, 0], slopes[:, 0, a]
-            by_t = by_x * axis.by_grid(points[:, a])
-            bound = self._absolute(values, stated)[:, 0]
-            with np.errstate(divide="ignore"):
-                error[active] = bound / np.abs(by_x)
-            if is_log:
-                value, by_t = np.log(value), by_t / value
-            excess = direction * (value - goal[active])
-            above = excess > 0
-            high[active[above]] = t[active[above]]
-            low[active[~above]] = t[active[~above]]
-            step = t[active] - excess / (direction * by_t)
-            inside = (step > low[active]) & (step < high[active])
-            middle = 0.5 * (low[active] + high[active])
-            step = np.where(inside, step, middle)
-            # what rounding leaves of a sum of this size
-            near = np.abs(excess) <= SOLVED * np.maximum(np.abs(goal[active]), is_log)
-            moved = np.abs(step - t[active])
-            t[active] = np.where(near & ~inside, t[active], step)
-            done = near | (moved <= 4e-16 * np.maximum(span, np.abs(t[active])))
-            # on one polynomial, the error that follows such a step is its square
-            is_last = inside & (moved <= LAST_STEP * self._widths[cells, a])
-            done |= is_last & self._is_in(cells, a, step)
-            active = active[~done]
-            if not active.size:
-                break
-        else:
-            raise ConvergenceError(f"the inverse along {axis.name} did not converge")
-        found = axis.from_grid(t)
-        return found, error + ROUNDING * np.abs(found)
+        allowed = f"{limits}, which the table reaches along {axis.name}"
+        require(self.outputs[k].name, target, is_reached, allowed)
 
-    def _is_in(
-        self, cells: NDArray[np.int64], a: int, t: FloatArray
-    ) -> NDArray[np.bool_]:
-        """Whether coordinates on an axis lie in these cells."""
-        low, high = self._ends
-        return np.asarray((t >= low[cells, a]) & (t <= high[cells, a]))
+    @shared_property
+    def _guesses(self) -> FloatArray:
+        """Guesses of stored outputs where boxes are halved, by which an inverse takes a half.
+
+        Parabolas through the middle of the two halves' common face and the ends of its
+        middle lines. Shape (outputs, boxes, 2 axes + 1), as mbma.h describes them.
+        """
+        branches = self.arrays["branches"]
+        low, high = self._box_ends
+        count = len(self.axes)
+        boxes = np.flatnonzero(branches[:, 0] >= 0)
+        center = 0.5 * (low[boxes] + high[boxes])
+        center[np.arange(len(boxes)), branches[boxes, 0].astype(int)] = self.arrays[
+            "middles"
+        ][boxes]
+        found = np.zeros((len(self.outputs), len(branches), 2 * count + 1))
+        value = self._stored(center)
+        constant = value.copy()
+        for a in range(count):
+            half = 0.5 * (high[boxes, a] - low[boxes, a])
+            ends = []
+            for sign in (-1, 1):
+                places = center.copy()
+                places[:, a] += sign * half
+                ends.append(self._stored(places))
+            slope = 0.5 * (ends[1] - ends[0]) / half
+            curvature = 0.5 * (ends[1] + ends[0] - 2 * value) / half**2
+            found[:, boxes, a] = slope - 2 * curvature * center[:, a]
+            found[:, boxes, count + a] = curvature
+            constant += (curvature * center[:, a] - slope) * center[:, a]
+        # along the axis itself nothing is added
+        halved = branches[boxes, 0].astype(int)
+        place = center[np.arange(len(boxes)), halved]
+        own = found[:, boxes, halved] + found[:, boxes, count + halved] * place
+        found[:, boxes, -1] = constant + own * place
+        return found
+
+    def _stored(self, places: FloatArray) -> FloatArray:
+        """Outputs as they are stored, shape (outputs, points), at coordinates of the axes."""
+        x = [axis.from_grid(places[:, a]) for a, axis in enumerate(self.axes)]
+        values = self._answers(np.ascontiguousarray(np.stack(x, axis=-1)), False)[0].T
+        logs = [output.transform == "log" for output in self.outputs]
+        values[logs] = np.log(values[logs])
+        return np.asarray(values)
 
     def replayed(self) -> tuple[int, float]:
         """Held-out points that the file keeps, and the largest error there over the bound."""

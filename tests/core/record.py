@@ -141,6 +141,15 @@ def use():
     of_functions = table_of_a_function()
     of_functions.lookup(np.linspace(0, 1, 300), 0.5)
     of_functions.lookup(np.linspace(0, 1, 300), 3.7, derivatives=1)
+    for guess in (np.empty(0), of_functions._guesses[0].ravel()):
+        # more points than are sorted at a time, some without an answer
+        wanted = np.linspace(-2.0, 3.0, 2200)
+        points = np.tile([0.3, 1.2], (2200, 1)).reshape(-1)
+        numbers = np.empty((2, 2200))
+        core.cell_inverse(
+            *(*of_functions._core, 0, 0, 1, guess, wanted),
+            *(points, *numbers, np.empty(2200, dtype=np.int64)),
+        )
     greenwood_tripp.rigid_sphere(X, mu)
     greenwood_tripp.solve(X[50:250:10], mu[50:250:10]).pressure.sum()
     one = Surface(0.7, 0.2, 60.0, 1.0, 3.0)

@@ -25,7 +25,7 @@ from mbma_tables.export.text import (
     opening,
     template,
 )
-from mbma_tables.tables.function_table import IN_CORE, FunctionTable
+from mbma_tables.tables.function_table import IN_CORE, ROUNDING, FunctionTable
 
 LINE = 118  # letters
 MAX_NAME = 40
@@ -137,6 +137,9 @@ def _parts(
             )
         ],
         "tolerance": number(TOLERANCE),
+        "directions": table.directions().tolist(),
+        "rounding": number(ROUNDING),
+        "number": number,
         "policies": [POLICIES[IN_CORE[axis.outside]] for axis in table.axes],
         # at least 3, since compilers look at the recurrence from the third on
         "most_terms": max(int(terms.max()), 3),
