@@ -17,7 +17,7 @@ from mbma_tables import (
     island,
     sensitivity,
 )
-from mbma_tables.common.plots import DrawnCurve, draw_compression, to_picture
+from mbma_tables.common.plots import Line, draw_compression, to_picture
 from mbma_tables.export.rows.law_rows import describe_law
 
 ROAD = Surface.named("concrete")
@@ -282,17 +282,25 @@ FORCE = np.array([0.0, 2e-5, 3e-4, 2e-2])
 AREA = np.array([0.0, 3e-5, 4e-4, 3e-2])
 
 
-def two_curves() -> list[DrawnCurve]:
+def lines(name, gap, force, area, scatter=None, area_scatter=None):
+    return {
+        "gap": Line(name, gap),
+        "pressure": Line(name, force, scatter),
+        "area": Line(name, area, area_scatter),
+    }
+
+
+def two_curves():
     return [
-        DrawnCurve("first", GAP, FORCE, AREA),
-        DrawnCurve("second", GAP[:3] + 0.5, 2 * FORCE[1:], AREA[1:]),
+        lines("first", GAP, FORCE, AREA),
+        lines("second", GAP[:3] + 0.5, 2 * FORCE[1:], AREA[1:]),
     ]
 
 
 def test_scatter_is_a_band_of_one_standard_deviation():
     scatter = np.array([np.nan, 0.7, 0.3, 0.1])
     figure = draw_compression(
-        [DrawnCurve("law", GAP, FORCE, AREA, scatter, 0.1 * scatter), *two_curves()]
+        [lines("law", GAP, FORCE, AREA, scatter, 0.1 * scatter), *two_curves()]
     )
     for axes, x, y, spread in (
         (figure.axes[0], GAP, FORCE, scatter),
@@ -310,9 +318,9 @@ def test_scatter_is_a_band_of_one_standard_deviation():
                     .any()
                 )
         assert corners[:, 0].min() >= x[1:].min()
-    unknown = draw_compression([DrawnCurve("law", GAP, FORCE, AREA, np.full(4, np.nan))])
+    unknown = draw_compression([lines("law", GAP, FORCE, AREA, np.full(4, np.nan))])
     assert not unknown.axes[0].collections
-    for bad in ([], [DrawnCurve("law", GAP, 0 * FORCE, AREA)]):
+    for bad in ([], [lines("law", GAP, 0 * FORCE, AREA)]):
         with pytest.raises(InputError, match=r"no contact|at least one"):
             draw_compression(bad)
 

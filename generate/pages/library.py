@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import ast
 import collections
-import dataclasses
 import itertools
 import math
 import re
@@ -264,11 +263,13 @@ def picture() -> Figure:
     curves = []
     for theory in ("calibrated", "mbma", "persson"):
         curve = contact(surface, mean_separation=u, theory=theory).curve()
-        curve = dataclasses.replace(curve, label=theory_label(theory))
+        named = {
+            axis: line._replace(name=theory_label(theory)) for axis, line in curve.items()
+        }
         # three bands would hide one another
         if theory != "calibrated":
-            curve = dataclasses.replace(curve, scatter=None, area_scatter=None)
-        curves.append(curve)
+            named = {axis: line._replace(scatter=None) for axis, line in named.items()}
+        curves.append(named)
     title = (
         f"H = {hurst:g}, q1/q0 = {zeta_1:g}: a spectrum that no constant was fitted to"
     )

@@ -5,7 +5,6 @@ Figures are drawn without pyplot, so nothing of the caller's matplotlib state is
 
 from __future__ import annotations
 
-import dataclasses
 import io
 import re
 from collections.abc import Mapping, Sequence
@@ -44,20 +43,21 @@ def leakage_label(unit: str) -> str:
     return LEAKAGE_LABEL if unit == "1" else f"{LEAKAGE_LABEL} [{unit}]"
 
 
-@dataclasses.dataclass(frozen=True)
-class DrawnCurve:
-    """One line of a picture; arrays of one length, NaN where a scatter is not known."""
+class Line(NamedTuple):
+    """A line of a panel, with its band."""
 
-    label: str  # in the legend
-    gap: FloatArray  # mean separation u/h_rms (50)
-    pressure: FloatArray  # F/A0, or F/(A0 E*)
-    area: FloatArray  # A/A0
-    scatter: FloatArray | None = (
-        None  # standard deviation of ln F at the gap, drawn as a band,
-    )
-    area_scatter: FloatArray | None = None  # and of ln A at the force
-    leakage: FloatArray | None = None  # flow coefficient of the gaps, zero where blocked,
-    leakage_scatter: FloatArray | None = None  # and standard deviation of its logarithm
+    name: str
+    values: FloatArray
+    scatter: FloatArray | None = None  # standard deviation of ln of the values
+    #: in place of it the lower and the upper end of the band
+    ends: tuple[FloatArray, FloatArray] | None = None
+
+
+# one surface's contact, in lines of one length by what is along their axis: the "gap"
+# u/h_rms (50), the "pressure" F/A0, or F/(A0 E*), with its scatter at the gap, the "area"
+# A/A0 with that at the pressure, and perhaps "leakage", the flow coefficient of the gaps,
+# zero where blocked; scatter is NaN where not known
+CompressionLines = Mapping[str, Line]
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -78,16 +78,6 @@ def draw_line(x: Any, y: Any, x_label: str, y_label: str) -> Figure:
     axes.set(xlabel=x_label, ylabel=y_label)
     axes.grid(True, which="major", alpha=0.3)
     return figure
-
-
-class Line(NamedTuple):
-    """A line of a panel, with its band."""
-
-    name: str
-    values: FloatArray
-    scatter: FloatArray | None = None  # standard deviation of ln of the values
-    #: in place of it the lower and the upper end of the band
-    ends: tuple[FloatArray, FloatArray] | None = None
 
 
 def draw_panels(
@@ -131,7 +121,7 @@ def number_ticks(axes: Axes) -> None:
 
 
 def draw_compression(
-    curves: Sequence[DrawnCurve],
+    curves: Sequence[CompressionLines],
     title: str = "",
     pressure_label: str = PRESSURE_LABEL,
     gap_label: str = GAP_LABEL,
@@ -147,31 +137,30 @@ def draw_compression(
     if not curves:
         raise InputError("no curves to draw: at least one is needed")
     panels = [
-        ("gap", "pressure", "scatter", gap_label, pressure_label),
-        ("pressure", "area", "area_scatter", pressure_label, "real contact area  A/A0"),
-        ("pressure", "leakage", "leakage_scatter", pressure_label, leakage_label),
-    ][: 2 + any(curve.leakage is not None for curve in curves)]
+        ("gap", "pressure", gap_label, pressure_label),
+        ("pressure", "area", pressure_label, "real contact area  A/A0"),
+        ("pressure", "leakage", pressure_label, leakage_label),
+    ][: 2 + any("leakage" in curve for curve in curves)]
     figure = new_figure(5 * (len(panels) + len(more)), 4.5)
     standard_axes, others = np.split(
         figure.subplots(1, len(panels) + len(more)), [len(panels)]
     )
-    for axes, (x_name, y_name, scatter, x_label, y_label) in zip(
+    for axes, (x_name, y_name, x_label, y_label) in zip(
         standard_axes, panels, strict=True
     ):
         for curve in curves:
-            touches = (curve.pressure > 0) & (curve.area > 0)
+            touches = (curve["pressure"].values > 0) & (curve["area"].values > 0)
             if not touches.any():
                 raise InputError(
-                    f"{curve.label!r} has no contact to draw on logarithmic axes"
+                    f"{curve['pressure'].name!r} has no contact to draw on logarithmic axes"
                 )
-            x = getattr(curve, x_name)
-            y = getattr(curve, y_name)
-            if y is not None:
-                y = np.where(touches & (np.asarray(y) > 0), y, np.nan)
-                axes.plot(
-                    x, y, marker="." if curve is curves[0] else "", label=curve.label
-                )
-                _band(axes, x, y, getattr(curve, scatter))
+            line = curve.get(y_name)
+            if line is not None:
+                x = curve[x_name].values
+                y = np.where(touches & (line.values > 0), line.values, np.nan)
+                marker = "." if curve is curves[0] else ""
+                axes.plot(x, y, marker=marker, label=line.name)
+                _band(axes, x, y, line.scatter)
         axes.set(
             xlabel=x_label,
             ylabel=y_label,
@@ -179,9 +168,10 @@ def draw_compression(
             yscale="log",
         )
     for axes, (label, lines) in zip(others, more.items(), strict=True):
+        pressure = curves[0]["pressure"].values
         for line in lines:
-            axes.loglog(curves[0].pressure, line.values, marker=".", label=line.name)
-            _band(axes, curves[0].pressure, line.values, line.scatter)
+            axes.loglog(pressure, line.values, marker=".", label=line.name)
+            _band(axes, pressure, line.values, line.scatter)
         axes.set(xlabel=pressure_label, ylabel=label)
     for axes in figure.axes:
         axes.grid(True, which="major", alpha=0.3)

@@ -23,7 +23,7 @@ from mbma_tables.common.arguments import (
 from mbma_tables.common.display import Displayed, Variable, quantity, shown
 from mbma_tables.common.errors import InputError, MissingError
 from mbma_tables.common.plots import (
-    DrawnCurve,
+    CompressionLines,
     Line,
     draw_compression,
     new_figure,
@@ -652,24 +652,26 @@ class Contact(State, Displayed):
             )
         return lines
 
-    def curve(self, leakage: bool = False) -> DrawnCurve:
-        """The line that plots draw, for one surface at several separations; optionally with its leakage."""
+    def curve(self, leakage: bool = False) -> CompressionLines:
+        """The lines that plots draw, for one surface at several separations; optionally with its leakage."""
         if np.size(self.pressure) < 2 or self.surface.shape != ():
             raise InputError(
                 "one surface's force and area at several separations make a curve, and this has none"
             )
         order = np.argsort(-np.ravel(self.mean_separation), kind="stable")
-        fields = [
-            self.mean_separation / self.surface.h_rms,
-            self.pressure,
-            self.area,
-            self.scatter,
-            self.area_scatter,
-        ]
+        fields: dict[str, tuple[Any, ...]] = {
+            "gap": (self.mean_separation / self.surface.h_rms,),
+            "pressure": (self.pressure, self.scatter),
+            "area": (self.area, self.area_scatter),
+        }
         if leakage:
-            fields += [self.leakage.K, self.leakage.scatter]
+            fields["leakage"] = (self.leakage.K, self.leakage.scatter)
         label = theory_label(self.theory) + (f", {self.variant}" if self.variant else "")
-        return DrawnCurve(label, *(np.ravel(field)[order] for field in fields))
+        lines = {}
+        for axis, (values, *scatter) in fields.items():
+            band = np.ravel(scatter[0])[order] if scatter else None
+            lines[axis] = Line(label, np.ravel(values)[order], band)
+        return lines
 
     def map(self) -> ContactMap:
         """Pressure, gap and contact at every point of the surface's map, simulated on its full grid at this pressure.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import collections
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -19,17 +18,13 @@ from mbma_tables.theories.simulated.grids import AREAS
 from mbma_tables.theories.simulated.one_map import BoundaryElements
 from mbma_tables.theories.simulated.pressing import TOLERANCE, Press
 from mbma_tables.theories.yielding.theory import Yielding, elastic_scatter
-from mbma_tables.theories.yielding.unloading import Peak, Unloading
+from mbma_tables.theories.yielding.unloading import Peak, Unloading, YieldedContacts
 
 # pressures over the largest at which a residual shape is pressed
 UNLOADED = (0.01, 0.03, 0.07, 0.13, 0.22, 0.35, 0.5, 0.65, 0.8, 0.91, 1.0)
 KEPT = 8  # hardnesses of maps whose simulations are kept
 # standard deviations of ln of a quantity, by `python -m generate machined`
 SCATTER = {"area": 0.010, "pressure": 0.011, "unloading_stiffness": 0.033}
-
-Loaded = collections.namedtuple(
-    "Loaded", ("answer", "yielded", "unloading_stiffness", "plane_separation")
-)
 
 
 class Plastic(BoundaryElements):
@@ -203,7 +198,7 @@ class Saturated(Yielding):
             return [*answer, np.zeros_like(u), answer.stiffness, u]
 
         found = self._each(ask, mean_separation)
-        return Loaded(TheoryAnswer(*found[:4]), *found[4:])
+        return YieldedContacts(TheoryAnswer(*found[:4]), *found[4:])
 
     def at_force(
         self, surface: AnySurface, pressure: FloatArray

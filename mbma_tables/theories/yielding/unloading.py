@@ -229,8 +229,8 @@ class Tail(NamedTuple):
         return np.asarray(np.clip(share, 0.0, 1.0))
 
 
-class Unloaded(NamedTuple):
-    """Contacts below their largest pressure, as `theories.yielding.theory.Loaded` has those of loading."""
+class YieldedContacts(NamedTuple):
+    """Contacts that yielded: the numbers that `theories.yielding.theory.Loaded` derives by the law."""
 
     answer: TheoryAnswer
     yielded: FloatArray
@@ -395,7 +395,7 @@ class Unloading(Theory):
 
     def loaded(
         self, surface: AnySurface, mean_separation: FloatArray, lighter: Any = None
-    ) -> Unloaded:
+    ) -> YieldedContacts:
         """Contacts at mean separations u [length]; `lighter` are those of the elastic contact at the same forces."""
         u = np.asarray(mean_separation, dtype=float)
         peak = self.peak(surface)
@@ -408,24 +408,24 @@ class Unloading(Theory):
         branch = self._branch(surface, peak, np.maximum(v, peak.elastic_separation), u)
         return self._joined(below, self._light(surface, branch, u), first)
 
-    def _joined(self, below: Any, branch: Any, first: Any) -> Unloaded:
+    def _joined(self, below: Any, branch: Any, first: Any) -> YieldedContacts:
         """Contacts of the branch where they are below it, else of first loading."""
         fields = [
             np.where(below, one, other)
             for one, other in zip(branch.answer, first.answer, strict=True)
         ]
-        return Unloaded(
+        return YieldedContacts(
             TheoryAnswer(*fields),
             *(
                 np.where(below, getattr(branch, name), getattr(first, name))
-                for name in Unloaded._fields[1:]
+                for name in YieldedContacts._fields[1:]
             ),
         )
 
     @np.errstate(divide="ignore", invalid="ignore")
     def _branch(
         self, surface: AnySurface, peak: Peak, v: FloatArray, u: FloatArray
-    ) -> Unloaded:
+    ) -> YieldedContacts:
         """Contacts of the branch, by mean separations v of the elastic contact at the same forces."""
         elastic = self.branch_theory.answer(surface, v)
         s = np.minimum(elastic.pressure / peak.pressure, 1.0)
@@ -441,10 +441,12 @@ class Unloading(Theory):
             s * peak.pressure, np.where(s > 0, area, 0.0), stiffness, error
         )
         yielded = np.where(s > 0, peak.yielded, 0.0)
-        return Unloaded(answer, yielded, stiffness, u - peak.flattening)
+        return YieldedContacts(answer, yielded, stiffness, u - peak.flattening)
 
     @np.errstate(divide="ignore", invalid="ignore", over="ignore")
-    def _light(self, surface: AnySurface, branch: Unloaded, u: FloatArray) -> Unloaded:
+    def _light(
+        self, surface: AnySurface, branch: YieldedContacts, u: FloatArray
+    ) -> YieldedContacts:
         """The branch with its lightest contacts."""
         tail = self.tail(surface)
         light = u > tail.first
