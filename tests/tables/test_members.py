@@ -2,6 +2,8 @@
 
 import json
 import pickle
+import shutil
+import subprocess
 
 import numpy as np
 import pytest
@@ -10,6 +12,8 @@ from click.testing import CliRunner
 
 from mbma_tables import InputError, TableFileError, open_table
 from mbma_tables.cli import main
+from mbma_tables.export.model.function_code import function_code
+from mbma_tables.export.text import core_file
 from mbma_tables.tables import make_function
 from mbma_tables.tables.make_function import make, merge, wanted_of
 from mbma_tables.tables.merged_members import merge_members
@@ -286,3 +290,68 @@ def test_members_of_other_axes_are_refused(variants, tmp_path):
     with pytest.raises(InputError, match=r"axes of .*wide.nc differ .* high=2"):
         merge_members(tmp_path / "t.nc", files, "envelope")
     assert not (tmp_path / "t.nc").exists()
+
+
+SPREADS = r"""
+#include <stdio.h>
+#include "made_members.h"
+int main(void)
+{
+    double x[2];
+    while (scanf("%lf %lf", x, x + 1) == 2) {
+        made_spread found[2];
+        const mbma_status status = made_spreads(x, found);
+        for (int f = 0; f < 2; f++) {
+            printf("%d %.17g %.17g %.17g", status != MBMA_OK, found[f].low, found[f].high, found[f].error);
+            for (int m = 0; m < MADE_MEMBERS; m++)
+                printf(" %.17g", found[f].members[m]);
+            printf("\n");
+        }
+    }
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def cells(tmp_path_factory):
+    """cells.c of the exported files, compiled once for all rules."""
+    folder = tmp_path_factory.mktemp("cells")
+    for file in ("cells.c", "elementary.h", "four.h", "mbma.h"):
+        (folder / file).write_text(core_file(file))
+    subprocess.run(["gcc", "-std=c11", "-O0", "-c", "cells.c"], cwd=folder, check=True)
+    return folder / "cells.o"
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
+@pytest.mark.parametrize("rule", ["replicas", "envelope", "symmetric_hessian", "hessian"])
+def test_c_of_all_members_answers_with_their_spread(rule, tables, cells, tmp_path):
+    """Within the bounds of the functions themselves, at points where the self-test has none."""
+    for file, text in function_code(tables[rule], "c", "made").items():
+        (tmp_path / file).write_text(text)
+    (tmp_path / "run.c").write_text(SPREADS)
+    strict = ["-std=c11", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-O0"]
+    line = ["gcc", *strict, "-c", "made.c", "made_members.c"]
+    subprocess.run(line, cwd=tmp_path, check=True)
+    shared = ["made.o", "made_members.o", str(cells), "-lm", "-o"]
+    for program in ("made_members_selftest.c", "run.c"):
+        line = ["gcc", *strict, program, *shared, program[:-2]]
+        subprocess.run(line, cwd=tmp_path, check=True)
+    tested = subprocess.run(["./made_members_selftest"], cwd=tmp_path, check=False)
+    assert tested.returncode == 0
+    x = [(0.11, 0.02), (2.0, 0.3), (9.0, 0.99)]
+    text = "\n".join(f"{a} {b}" for a, b in [*x, (11.0, 0.5)])
+    done = subprocess.run(
+        ["./run"], cwd=tmp_path, input=text, text=True, capture_output=True, check=True
+    )
+    rows = np.array([line.split() for line in done.stdout.splitlines()], float)
+    assert (rows[:-2, 0] == 0).all()
+    assert (rows[-2:, 0] == 1).all()
+    assert np.isnan(rows[-2:, 1:]).all()
+    for k, point in enumerate(x):
+        u = rows[2 * k, 1:]
+        exact = [tabulated.replica(*point, seed)[0] for seed in SEEDS]
+        _, low, high = ends_by_hand(rule, exact)
+        assert abs(u[0] - low) <= u[2]
+        assert abs(u[1] - high) <= u[2]
+        assert u[2] <= 3e-5 * high
+        np.testing.assert_allclose(u[3:], exact, rtol=1e-6)

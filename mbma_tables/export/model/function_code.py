@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.export.reserved_words import (
     matlab_words,
@@ -26,6 +27,7 @@ from mbma_tables.export.text import (
     template,
 )
 from mbma_tables.tables.function_table import IN_CORE, ROUNDING, FunctionTable
+from mbma_tables.tables.members import RULES
 
 LINE = 118  # letters
 MAX_NAME = 40
@@ -144,6 +146,7 @@ def _parts(
         # at least 3, since compilers look at the recurrence from the third on
         "most_terms": max(int(terms.max()), 3),
         "most_products": int(terms.prod(axis=1).max()),
+        **_of_members(table, points),
     }
 
 
@@ -161,12 +164,39 @@ def _replayed(table: FunctionTable) -> tuple[Any, Any]:
     return np.stack(columns, axis=-1)[good], values[good]
 
 
+def _of_members(table: FunctionTable, points: FloatArray) -> dict[str, Any]:
+    """Further places of the templates of a table with members."""
+    members = table.members
+    if members is None:
+        return {}
+    found = table.lookup(*points.T, members=True)
+    rows = [
+        np.stack([spread.low, spread.high, spread.error, *spread.members], axis=-1)
+        for spread in found.spread.values()
+    ]
+    starts = table.arrays["starts"].astype(int) * len(members.stored)
+    return {
+        "members": members.names,
+        "stored": len(members.stored),
+        "rule": members.rule,
+        "meaning": RULES[members.rule],
+        "number": number,
+        "member_starts": numerals(starts),
+        "spreads": numerals(np.stack(rows, axis=1)),
+    }
+
+
 def _c_files(parts: dict[str, Any], name: str) -> dict[str, str]:
     files = {
         f"{name}.{end}": filled(f"model/function/table.{end}", **parts)
         for end in ("c", "h")
     }
     files[f"{name}_selftest.c"] = filled("model/function/selftest.c", **parts)
+    if "members" in parts:
+        files |= {
+            f"{name}_members{end}": filled(f"model/function/members{end}", **parts)
+            for end in (".c", ".h", "_selftest.c")
+        }
     return files | {
         each: core_file(each) for each in ("cells.c", "elementary.h", "four.h", "mbma.h")
     }
