@@ -1,7 +1,11 @@
 """The boundary-element campaign: its engine against closed forms, its surfaces, its file."""
 
 import dataclasses
+import pickle
+import subprocess
+import sys
 
+import disturbed
 import numpy as np
 import pytest
 import xarray as xr
@@ -208,6 +212,49 @@ def test_parts_solve_the_same_surfaces(tmp_path):
         np.testing.assert_equal(*found)
     with pytest.raises(InputError, match="1 <= k <= n"):
         run(tasks, tmp_path / "parts", part=(3, 2))
+
+
+@pytest.mark.slow
+def test_a_campaign_gives_the_same_bits_however_it_was_run(tmp_path, monkeypatch):
+    """In one run, two parts, on a cluster with a worker that is killed and one that is slow, and after SIGKILL."""
+    pytest.importorskip("distributed")
+    tasks = [
+        Task(dataclasses.replace(RECIPE, seed=seed), "training") for seed in range(5)
+    ]
+    run(tasks, tmp_path / "once", solve=disturbed.press)
+    for part in (1, 2):
+        run(tasks, tmp_path / "parts", part=(part, 2), solve=disturbed.press)
+    monkeypatch.setenv("MBMA_TEST_MARKS", str(tmp_path / "cluster.marks"))
+    run(tasks, tmp_path / "cluster", solve=disturbed.press_or_end, local_cluster=2)
+    assert {*(tmp_path / "cluster.marks").read_text().split()} == {"killed", "slow"}
+    program = (
+        "import pathlib, pickle, sys, disturbed\n"
+        "from generate.boundary_elements.run import run\n"
+        "tasks = pickle.load(sys.stdin.buffer)\n"
+        "run(tasks, pathlib.Path(sys.argv[1]), solve=disturbed.press_or_end)\n"
+    )
+    monkeypatch.setenv("MBMA_TEST_MARKS", str(tmp_path / "killed.marks"))
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(tmp_path / "killed")],
+        input=pickle.dumps(tasks),
+        check=False,
+        capture_output=True,
+    )
+    assert done.returncode == -9, done.stderr
+    # those before it are there, whole
+    assert len([*(tmp_path / "killed").iterdir()]) == disturbed.KILLED
+    run(tasks, tmp_path / "killed", solve=disturbed.press_or_end)
+    files = {path.name for path in (tmp_path / "once").iterdir()}
+    assert files == {f"{task.recipe.name}.npz" for task in tasks}
+    for folder in ("parts", "cluster", "killed"):
+        assert {path.name for path in (tmp_path / folder).iterdir()} == files
+        for name in files:
+            with (
+                np.load(tmp_path / "once" / name) as once,
+                np.load(tmp_path / folder / name) as other,
+            ):
+                assert once["traction"].max() > 0
+                np.testing.assert_equal({**other}, {**once})
 
 
 def _heights(recipe):
