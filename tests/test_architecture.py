@@ -11,7 +11,7 @@ import pytest
 from helpers import fresh
 
 import mbma_tables
-from generate.pages import library
+from generate.pages import ideas, library
 from mbma_tables import Joint, Surface, contact, contact_law, core
 from mbma_tables.contacts.result import Contact
 from mbma_tables.core import GENERATIONS
@@ -299,3 +299,25 @@ print(json.dumps(sorted({"scipy", "xarray"} & sys.modules.keys())))
 def test_a_first_contact_imports_no_large_package():
     """Of an elastic surface of five numbers; these imports take longer than all else of it."""
     assert fresh(FIRST_CONTACT) == []
+
+
+def test_answers_and_laws_are_told_by_their_members(tmp_path):
+    (tmp_path / "toy.py").write_text(
+        "class Answer:\n    pressure: float\n    area: float\n"
+        "class Further(Answer):\n    pass\n"
+        "class Question:\n    pressure: float | None = None\n    area: float | None = None\n"
+        "class Law:\n    def pressure(self, u): ...\n    def area(self, u): ...\n"
+        "class Displayed:\n    @property\n    def area(self): ...\n    force = property(len)\n"
+        "class ByOthers:\n    force = made('force')\n    stiffness = made('stiffness')\n",
+        encoding="utf-8",
+    )
+    known = ideas.classes(tmp_path)
+    assert len(known) == 6
+    assert ideas.of_contacts(known) == (
+        ["Answer", "Displayed", "Further"],
+        ["ByOthers", "Law"],
+    )
+    recipes = ideas.files_of_recipes()
+    # no recipe takes the number of another one
+    assert recipes["A quantity"] == "four"
+    assert "Set-up" not in recipes

@@ -21,6 +21,7 @@ from generate.boundary_elements.evidence import evidence
 from generate.distances import pocket_errors
 from generate.files import ROOT, read_csv
 from generate.page import Cell, Measured, duration, panels, table
+from generate.pages.ideas import ideas
 from mbma_tables import Surface, contact
 from mbma_tables.common.plots import draw_compression, theory_label
 from mbma_tables.design.scenes.plan import shipped_costs
@@ -125,7 +126,7 @@ def architecture() -> Measured:
                 "connectionstyle": f"arc3,rad={-0.15 - 0.4 / (y - down)}",
             }
             axes.annotate("", (RIGHT, down + 0.12), (RIGHT, y - 0.12), arrowprops=style)
-    return {}, {"docs/figures/architecture.svg": figure}
+    return {"ideas": ideas()}, {"docs/figures/architecture.svg": figure}
 
 
 def tables() -> Measured:

@@ -66,7 +66,7 @@ from mbma_tables.design.derivatives import Described
 from mbma_tables.design.functions import ContactFunction
 from mbma_tables.design.labels import Labels
 from mbma_tables.design.sensitivity import Sensitivity, sensitivity_of
-from mbma_tables.design.specimen import is_of_numbers, surface_of_entries
+from mbma_tables.design.specimen import is_of_numbers, surface_of_entries, take_theory
 from mbma_tables.design.uncertainty import (
     DRAWS,
     LEVELS,
@@ -80,7 +80,6 @@ from mbma_tables.design.uncertainty import (
     uncertainty_of,
 )
 from mbma_tables.design.unknowns import OfOneMap, Unknowns, unknowns_of
-from mbma_tables.islands.island_models import beside
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.drawing import entries_of, with_area
 from mbma_tables.surfaces.roughness import TOPS
@@ -527,12 +526,7 @@ class Joint(JointQuantities, Displayed):
     ) -> Joint:
         """The joint of the entries of a TOML file, whose path is that of a file of maps and of messages."""
         given = dict(entries)
-        names = [name for name in options_of("mbma") if name in given]
-        options = {name: given.pop(name) for name in names}
-        if "island_model" in options:
-            options["island_model"] = beside(options["island_model"], path.parent)
-        if options:
-            given["theory"] = resolve(given.get("theory"), options=options)
+        take_theory(given, options_of("mbma"), path.parent)
         for name in FACES:
             part = given.get(name)
             if isinstance(part, Mapping) and "map" in part:

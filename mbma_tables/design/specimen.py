@@ -6,7 +6,7 @@ import dataclasses
 import json
 import os
 import pathlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from mbma_tables.bodies.materials import effective_modulus
@@ -17,12 +17,14 @@ from mbma_tables.common.plain_text import visible
 from mbma_tables.common.toml_files import check, read_toml
 from mbma_tables.common.units import Units, factor, in_one_unit, in_unit, known
 from mbma_tables.contacts.quantities.registry import registry
+from mbma_tables.islands.island_models import beside
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.roughness import ROUGHNESS
 from mbma_tables.surfaces.self_affine import CASES, PARAMETERS
 from mbma_tables.surfaces.spectrum import MIN_ZETA_1
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.surfaces.treatment import OPTIONS, Treated
+from mbma_tables.theories import resolve
 
 MAGNIFICATION = ("hurst", "q0", "zeta_1", "h_rms", "h_max")
 MOMENTS = ("hurst", "m0", "m2", "m4", "h_max")
@@ -185,6 +187,20 @@ def effective_modulus_of(
             f"a material is E_star alone, or all of E1, nu1, E2, nu2; got {', '.join(given)}"
         )
     return float(effective_modulus(**numbers)), unit
+
+
+def take_theory(
+    entries: dict[str, Any], names: Iterable[str], folder: pathlib.Path
+) -> None:
+    """Put options of a theory among the entries of a file, those of `names`, into its theory.
+
+    An island model that is a file is relative to `folder`.
+    """
+    options = {name: entries.pop(name) for name in names if name in entries}
+    if "island_model" in options:
+        options["island_model"] = beside(options["island_model"], folder)
+    if options:
+        entries["theory"] = resolve(entries.get("theory"), options=options)
 
 
 def refuse_joint(path: pathlib.Path, entries: Mapping[str, Any]) -> None:

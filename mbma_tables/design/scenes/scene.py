@@ -27,8 +27,7 @@ from mbma_tables.contacts.quantities.registry import registry
 from mbma_tables.contacts.question import PRESCRIBED, Question
 from mbma_tables.contacts.result import Contact, Setup
 from mbma_tables.design.scenes.plan import LEAKAGE, Plan, make_plan
-from mbma_tables.design.specimen import from_tables, refuse_joint, schema
-from mbma_tables.islands.island_models import beside
+from mbma_tables.design.specimen import from_tables, refuse_joint, schema, take_theory
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.tables.island4d import Island4dModel
 from mbma_tables.tables.universal import UniversalModel
@@ -405,11 +404,7 @@ class Scene:
         check(content, schema())
         given = {"title": title} | dict(content)
         specimen = from_tables({"surface": given.pop("surface")}, folder, title)
-        options = {name: given.pop(name) for name in OF_FILES if name in given}
-        if OF_SUMS in options:
-            options[OF_SUMS] = beside(options[OF_SUMS], folder)
-        if options:
-            given["theory"] = resolve(given.get("theory"), options=options)
+        take_theory(given, OF_FILES, folder)
         return cls(specimen.surface, **given)
 
     def plan(self) -> Plan:
