@@ -158,10 +158,12 @@ def surface_of(one: Simulated, sides: int, count: int, way: str) -> MeasuredSurf
     return Surface.from_profile(along, step_x, across=across)
 
 
-def rows_of(one: Simulated) -> Iterator[dict[str, Any]]:
+def rows_of(
+    one: Simulated, traces: tuple[tuple[int, int], ...] = TRACES
+) -> Iterator[dict[str, Any]]:
     """Relative errors and standard deviations of every contact, of all traces of a map."""
     ways = ("one", "both") if one.family in ISOTROPIC else ("both",)
-    for (sides, count), way in itertools.product(TRACES, ways):
+    for (sides, count), way in itertools.product(traces, ways):
         surface = surface_of(one, sides, count, way)
         found = contact(surface, pressure=one.pressure, theory="calibrated")
         gap = np.asarray(found.mean_separation)

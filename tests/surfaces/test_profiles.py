@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from helpers import refusals, topographies
 
+from generate.machined import profiles as measured
 from mbma_tables import Surface, contact
 from mbma_tables.common.errors import InputError
 from mbma_tables.surfaces import profiles
@@ -189,6 +190,21 @@ def test_sums_over_panels_do_not_depend_on_blocks(monkeypatch):
         )
 
 
+def test_rows_of_the_data_are_still_those_that_are_computed():
+    rows = [row for row in measured.read() if row["sides"] == "8"]
+    for maps in (measured.machined(8, 4), measured.elastic(8, 4)):
+        one = next(maps)
+        of_map = [row for row in rows if row["map"] == one.name]
+        again = list(measured.rows_of(one, ((8, 1),)))
+        assert len(again) == len(of_map) > 0
+        for before, now in zip(of_map, again, strict=True):
+            for name in ("error", "scatter"):
+                was, found = float(before[name]), float(now[name])
+                assert found == pytest.approx(was, rel=0.02, abs=2e-3, nan_ok=True)
+            for name in ("family", "way", "quantity", "area", "valid"):
+                assert str(now[name]) == before[name]
+
+
 class TestSeveral:
     """Several traces of one surface, along and across its lay."""
 
@@ -215,6 +231,16 @@ class TestSeveral:
             )
             # twelve traces know their standard deviation to 21%
             assert 1 / 1.6 < of_replicas / of_traces < 1.8
+        # m4 of so few plane waves varies more than that of a Gaussian process, whose variance
+        # is the integral of its squared spectrum, twice under a window
+        q = np.linspace(0, SHORTEST, 1001)[1:-1]
+        C = plateau(0.6, ROLL_OFF, ROLL_OFF / 4)
+        # by the Abel transform of C over q' = q cosh t
+        cosh = np.cosh(np.linspace(0, 8, 8001))
+        powers = np.array([one**5 * np.sum(C(one * cosh) * cosh) for one in q])
+        expected = np.sqrt(2 * 2 * np.pi / POINTS * np.sum(powers**2) / q[0])
+        of_m4 = [np.std(np.log([s.m4 for s in one.scans])) for one in found]
+        assert np.mean(of_m4) == pytest.approx(expected / np.sum(powers), rel=0.25)
         many = Surface.from_profile(lines[:9], 1.0)
         spread = np.std(np.log([scan.rms_gradient for scan in many.scans]))
         of_one = np.std(np.log([scan.rms_gradient for scan in found[0].scans]))
