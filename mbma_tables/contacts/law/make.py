@@ -4,7 +4,8 @@ import dataclasses
 import functools
 import math
 import sys
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -152,20 +153,6 @@ def _elastic_law(setup: Setup, rtol: float) -> ContactLaw:
     return _law_of_theory(setup, setup.theory, rtol)
 
 
-class _Fitting(NamedTuple):
-    """What is fitted, and what a law needs to know of it beside the polynomials."""
-
-    scale: float  # of x = scale (h_max + s d) on a side of sign s
-    sides: list[fit.Side]
-    first: fit.First  # the record below where x begins
-    limits: tuple[float, float]  # least and largest gap d
-    energy_beyond: float  # energy over E* of gaps above the largest
-    answer_errors: list[
-        FloatArray
-    ]  # the theory's, of all answers until the end of the fit
-    leverage: float  # error of slopes over F/x per error of answers
-
-
 def _law_of_theory(setup: Setup, theory: Theory, rtol: float) -> ContactLaw:
     """The law by the curves that a theory has for it, or else by its answers."""
     curves = theory.law_curves(setup.surface, rtol)
@@ -189,16 +176,17 @@ def _law_of_curves(setup: Setup, curves: Compression, tolerance: float) -> Conta
     # the leading powers within the layer, and down to the smallest double at most
     octaves = range(math.ceil(-math.log2(min(curves.layer, *curves.kinks))), 1100)
     start, first = fit.first_record(record_below, octaves, tolerance)
-    fitting = _Fitting(
+    return _fitted_law(
+        setup,
+        h_max,
+        tolerance,
         scale=1 / curves.end,
         sides=[fit.Side(-1, start, curves.values, curves.kinks)],
         first=first,
         limits=(h_max - curves.end, math.inf),
-        energy_beyond=0.0,
         answer_errors=[np.array([curves.error])],
         leverage=curves.leverage,
     )
-    return _fitted_law(fitting, tolerance, setup, h_max)
 
 
 def theory_law(setup: Setup, theory: Theory, rtol: float) -> ContactLaw:
@@ -241,22 +229,24 @@ def theory_law(setup: Setup, theory: Theory, rtol: float) -> ContactLaw:
     else:
         largest_gap = 2 * highest - h_max
         energy_beyond = 2 * float(theory.energy(surface, np.array(highest)))
-    fitting = _Fitting(
+    fitted = functools.partial(
+        _fitted_law,
+        setup,
+        h_max,
         scale=1 / (2 * width),
         sides=sides,
         first=first,
         limits=(2 * lowest - h_max, largest_gap),
         energy_beyond=energy_beyond,
         answer_errors=answer_errors,
-        leverage=0.0,
     )
     try:
-        return _fitted_law(fitting, tolerance, setup, h_max)
+        return fitted(tolerance)
     except ConvergenceError:
         # answers need not be smooth below their own error
         if error_of_answers <= tolerance:
             raise
-        return _fitted_law(fitting, error_of_answers, setup, h_max)
+        return fitted(error_of_answers)
 
 
 def _covered(surface: AnySurface, theory: Theory) -> tuple[float, float, bool]:
@@ -318,32 +308,46 @@ def _sides(
 
 
 def _fitted_law(
-    fitting: _Fitting, tolerance: float, setup: Setup, h_max: float
+    setup: Setup,
+    h_max: float,
+    tolerance: float,
+    *,
+    scale: float,
+    sides: Sequence[fit.Side],
+    first: fit.First,
+    limits: tuple[float, float],
+    answer_errors: Sequence[FloatArray],
+    energy_beyond: float = 0.0,
+    leverage: float = 0.0,
 ) -> ContactLaw:
-    """Fit the sides, put the block together, and look for turning points."""
-    scale = fitting.scale
-    lowest, highest = fitting.limits
-    sides: list[fit.Side] = []
-    for side in fitting.sides:
-        kinks = tuple(kink for kink in side.kinks if side.start < kink < 1)
-        sides.append(side._replace(kinks=kinks))
+    """Fit the sides, put the block together, and look for turning points.
+
+    x is scale (h_max + s d) on a side of sign s, and `first` the record below where x
+    begins; `limits` are the least and the largest gap d, and `energy_beyond` is the energy
+    over E* of gaps above the largest. `answer_errors` are the theory's, of all answers
+    until the end of the fit, and `leverage` is the error of slopes over F/x per error of
+    answers.
+    """
+    lowest, highest = limits
+    sides = [
+        side._replace(kinks=tuple(k for k in side.kinks if side.start < k < 1))
+        for side in sides
+    ]
     pieces = [fit.side_pieces(side, tolerance) for side in sides]
     # gaps that differ from the ends by rounding are answered, full compression excepted
     ends = (
         lowest if lowest == -h_max else lowest - ROUNDING * h_max,
         sys.float_info.max if highest == math.inf else highest * (1 + ROUNDING),
     )
-    block, records, errors = fit.assemble(
-        h_max, scale, sides, pieces, fitting.first, ends
-    )
+    block, records, errors = fit.assemble(h_max, scale, sides, pieces, first, ends)
     # records after the first in order of falling d, and the sign of d of each
     counts = [len(piece.records) for piece in pieces]
     signs = np.repeat([float(side.sign) for side in sides], counts)
     order = np.arange(1, len(records))
     if sides[-1].sign > 0:
         order[-counts[-1] :] = order[-counts[-1] :][::-1].copy()
-    power_of_force = fitting.first[2][0]
-    fit.fill_energies(records, order, signs, scale, power_of_force, fitting.energy_beyond)
+    power_of_force = first[2][0]
+    fit.fill_energies(records, order, signs, scale, power_of_force, energy_beyond)
     turns: list[float | None] = []
     for x, sign in fit.first_falls(records[order], signs):
         turns.append(None if x is None else sign * (x / scale - h_max))
@@ -352,8 +356,8 @@ def _fitted_law(
     records[:, fit.FORCE_AT : fit.AREA_AT] *= modulus
     records[:, fit.ENERGY_AT] *= modulus
     error_of_fit = float(errors[:, 0].max())
-    error_of_answers = float(np.concatenate(fitting.answer_errors).max())
-    errors = errors + np.array([0.0, fitting.leverage * error_of_answers])
+    error_of_answers = float(np.concatenate(answer_errors).max())
+    errors = errors + np.array([0.0, leverage * error_of_answers])
     elastic = None
     if setup.bodies.yields or setup.bodies.adhesion is not None:
         # what follows unloading is calculated from the law of the elastic contact, on demand
