@@ -90,6 +90,11 @@ FURTHER = (
 )
 
 
+# programs that take ten seconds for a law run it in one of so many turns
+SLOW = ("jax-law", "modelica-law")
+SLOW_TURNS = 4
+
+
 class Found(NamedTuple):
     """The largest relative error of a file's numbers, and the largest share of the error that it states."""
 
@@ -308,9 +313,18 @@ def _of_curve(one: Case, target: str, law: LawTable, name: str, curve: Curve) ->
     expected, floor, stated = one.known[key]
     # the header's error holds from the floor on
     taken = np.isfinite(expected) & (np.abs(expected) > 0) & (expected >= floor)
+    if law.x_name == "pressure":
+        # below the smallest pressure asked for there is the row of pressure zero alone
+        taken &= x >= law_begins(one, law)
     error = float(np.abs(y[taken] / expected[taken] - 1).max())
     allowed = (1 + stated) * (1 + curve.rtol) - 1
     return Found(error, error / allowed)
+
+
+def law_begins(one: Case, law: LawTable) -> float:
+    """The pressure [Pa] from which the header's error holds, where it has one."""
+    found = re.search(r", from pressure (\S+) \S+ on", " ".join(law.comments))
+    return one.size("pressure") * float(found[1]) if found else 0.0
 
 
 def stated_of(comments: tuple[str, ...], column: str) -> float:
@@ -624,8 +638,9 @@ def of_one_law(number: int) -> Iterator[tuple[str, Found]]:
     kinds = kinds_of(name)
     turn = number // len(programs)
     one = case(number, kinds[turn % len(kinds)])
-    with tempfile.TemporaryDirectory() as folder:
-        yield name, programs[name](one, name, pathlib.Path(folder))
+    if name not in SLOW or turn % SLOW_TURNS == 0:
+        with tempfile.TemporaryDirectory() as folder:
+            yield name, programs[name](one, name, pathlib.Path(folder))
     names = list(quantities(one))
     law = rows(one, names[(number + turn // len(kinds)) % len(names)])
     for target in targets("SOLVERS", "DATA").values():

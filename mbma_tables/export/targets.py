@@ -123,6 +123,7 @@ class Target:
     beside: tuple[str, ...] = ()  # ends of the names of other files
     # for the documentation: what the file has, and how that was tested
     output: str = ""
+    outside: str = ""  # what it does outside the range of a law
     tested: str = ""
     longest_name: int | None = None  # letters of a name, where one stands in the file
     # curves that the first file of rows has
@@ -185,6 +186,7 @@ class RowFormat:
     name: str  # of the target
     program: str
     output: str  # what the file has, for the documentation
+    outside: str  # what the program does outside the rows, in a few words
     tested: str  # how the program was seen to read it
     mark: str  # of comments
     # behaviour of the program outside the rows, and further notes for its user
@@ -290,6 +292,7 @@ class RowFormat:
             quantities=quantities,
             several=self.several is not None,
             output=self.output,
+            outside=self.outside,
             tested=self.tested,
             longest_name=self.longest_name if self.named else None,
             read=lambda content: self.read(content.decode()),

@@ -80,3 +80,14 @@ def test_functions_of_code_are_those_of_the_library(name, place, tmp_path):
     one = programs.case(FIRST + place, kinds[-place % len(kinds)], system)
     found = OF_CODE[name](one, name, tmp_path)
     assert 0 < found.share <= 1
+
+
+def test_every_target_states_what_it_does_outside_the_range():
+    assert [name for name, target in targets().items() if not target.outside] == []
+
+
+def test_the_stiffness_of_a_map_that_falls_with_pressure_keeps_its_rows():
+    """Rows below the value at the smallest pressure were left out wherever they were."""
+    one = programs.case(81, "map")
+    law = programs.rows(one, "tangential_stiffness")
+    assert programs.in_rows(one, OF_ROWS["csv"], law).share <= 1

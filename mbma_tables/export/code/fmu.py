@@ -361,6 +361,7 @@ TARGETS = (
             "an FMU of FMI 2.0, for model exchange and co-simulation: the C law, "
             "compiled for this platform and as source, units, directional derivatives"
         ),
+        outside="`fmi2Discard`, with a message",
         tested=(
             "FMPy 0.3.32: validated, run as exported, built by gcc 12.2 with warnings "
             "as errors, simulated both ways at 10,000 gaps, four laws, an overclosure "
@@ -376,6 +377,7 @@ TARGETS = (
             "the same of FMI 3.0; with `--binaries all` also for Linux, macOS and "
             "Windows on ARM"
         ),
+        outside="`fmi3Discard`, with a message",
         tested=(
             "FMPy 0.3.32: validated, run as exported, both ways, built by gcc 12.2 "
             "with the headers of the standard and warnings as errors; binaries for ARM "

@@ -95,6 +95,7 @@ class Language:
     program: Program
     # for the documentation: what the file has, and how that was tested
     output: str
+    outside: str  # what functions do outside the range
     tested: str
     evaluator: str = ""
     check: tuple[str, ...] = ()  # a command of its own tools that finds errors in {file}

@@ -399,6 +399,7 @@ def _target(name: str, language: Language) -> Target:
         alone=language.alone,
         beside=tuple(file.end for file in language.beside),
         output=language.output,
+        outside=language.outside,
         tested=language.tested,
     )
 

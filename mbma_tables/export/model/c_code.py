@@ -554,6 +554,7 @@ TARGETS = (
             "the whole model, C11: the table, island geometry, totals, the closed "
             "forms; the calibrated law and Persson's theory"
         ),
+        outside="NaN, and a status",
         tested=(
             "gcc and g++ 12.2, ziglang 0.17.1, warnings as errors, address and "
             "undefined-behaviour sanitizers"

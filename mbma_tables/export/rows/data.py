@@ -313,6 +313,7 @@ def _target(
     read: Callable[[bytes], list[Curve]],
     tested: str,
     output: str = "rows with units and the header",
+    outside: str = "rows end there; the program that reads them decides",
     **other: Any,
 ) -> Target:
     """A format of data, which takes any quantity."""
@@ -320,6 +321,7 @@ def _target(
         name,
         write,
         output=output,
+        outside=outside,
         tested=tested,
         read=read,
         **other,
@@ -349,5 +351,6 @@ TARGETS = (
         longest_name=MAX_MATLAB_NAME,
         several=True,
         beside=(".m",),
+        outside="an error of the function beside it",
     ),
 )

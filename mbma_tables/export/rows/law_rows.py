@@ -379,6 +379,7 @@ def _table(
     power = power_of_flow(quantity)
     y_name = quantity if exported.force is None else "force"
     floor = FLOOR * float(fine_y[-1])
+    above = ""
     if power:
         floor = float(fine_y[-1])
         if law.at_pressure(fine_x[-1]).area > LARGEST_AREA:
@@ -394,9 +395,14 @@ def _table(
         )
     if slope := follows(quantity) == unloading_stiffness.name:
         # below the smallest pressure of interest there is only the row of zero pressure
-        used = np.append(True, fine_y[1:] > floor * (1 - 1e-9))
+        # of a map the stiffness may fall with pressure, and be less than there above it
+        reached = fine_y > floor * (1 - 1e-9) if least is None else fine_x >= least
+        used = np.append(True, reached[1:])
         fine_x = fine_x[used]
         fine_y = fine_y[used]
+        if least is not None:
+            floor = min(floor, float(fine_y[1:].min()) * (1 - 1e-9))
+            above = f", from pressure {about(least)} {x_unit} on"
     if kappa is not None:
         # of a surface with a lay it depends on the contact area, and is known for some of them
         fine_y[1:] /= np.asarray(kappa(np.asarray(law.at_pressure(fine_x[1:]).area)))
@@ -422,7 +428,7 @@ def _table(
     comments = exported.header(
         f"{named} against {x_name} [{x_unit}]",
         f"{x_name} from 0 to {number(x[-1])} {x_unit}, {why}",
-        _of_rows(y_name, x.size, error, f"{y_name} {about(floor)} {y_unit}"),
+        _of_rows(y_name, x.size, error, f"{y_name} {about(floor)} {y_unit}{above}"),
         *of_others,
         *(
             []

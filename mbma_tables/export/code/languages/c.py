@@ -13,6 +13,7 @@ LANGUAGES = {
             "C99 and C++11: C code of the library, and the numbers of the law as data, "
             "in one file, and `NAME.h`, a header for C and C++"
         ),
+        outside="NaN",
         tested=(
             "gcc and g++ 12.2, -O2 and -O3, warnings as errors: 10,000 gaps down to "
             "1e-12 from first contact, six laws; with the compiler flags of the "

@@ -86,6 +86,7 @@ LANGUAGES = {
             "a Fortran 2008 module of elemental functions, and `NAME_c.c` beside it, "
             "the same C"
         ),
+        outside="NaN",
         tested=(
             "gfortran 12.2, `-std=f2008 -fcheck=all`, warnings as errors: the same "
             "gaps, three laws"

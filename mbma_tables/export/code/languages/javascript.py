@@ -68,6 +68,7 @@ LANGUAGES = {
             "an ECMAScript module (call it `NAME.mjs`), the same as a CommonJS module, "
             "`NAME.cjs`, and their types for TypeScript, `NAME.d.mts` and `NAME.d.cts`"
         ),
+        outside="a RangeError",
         tested=(
             "node 20.20: the same, opened by `import` and by `require`; TypeScript 5.9 "
             "with `--module node16`"

@@ -46,6 +46,7 @@ LANGUAGES = {
         array=matrix,
         reserved=_reserved,
         output="a function that returns a structure of functions",
+        outside="an error",
         tested="Octave 7.3: the same; not in MATLAB",
     )
 }

@@ -135,6 +135,7 @@ LANGUAGES = {
             "a package: pressure and energy with their derivatives, tangent, area, with"
             " units; the inverse is computed by the Modelica tool"
         ),
+        outside="an assertion that fails",
         tested=(
             "rumoca 0.10: compiled and simulated, within 1e-9 at 10,000 gaps of two laws"
         ),

@@ -55,6 +55,7 @@ LANGUAGES = {
         parts={"np": "np"},
         reserved=_reserved,
         output="a module that needs numpy only",
+        outside="a ValueError",
         tested="numpy 2.4: the same, five laws",
     ),
     "jax-law": Language(
@@ -79,6 +80,7 @@ LANGUAGES = {
             "the pressure and the coefficients; outside the range values and "
             "derivatives are NaN"
         ),
+        outside="NaN",
         tested="jax 0.10: the same, three laws",
     ),
 }

@@ -42,6 +42,7 @@ LANGUAGES = {
             "`UINTER` in C, in one file with the law: pressure, shear with Coulomb's "
             "friction, tangent, energies, heat flux and its derivatives"
         ),
+        outside="asks for a smaller increment",
         tested=(
             "called by a Fortran program with the argument list of the manual (2017), "
             "warnings as errors, which iterates as Abaqus does: paths of stick and slip"
@@ -70,6 +71,7 @@ LANGUAGES = {
             "`VUINTER` in C for Abaqus/Explicit, likewise, for all nodes of a contact "
             "pair: pressure, shear with friction, energies; without heat"
         ),
+        outside="keeps the last value, with a warning",
         tested=(
             "called by a Fortran program with the argument list of the manual (2017): "
             "paths of several nodes against an integration of its own; not in Abaqus"
@@ -89,6 +91,7 @@ LANGUAGES = {
             "`GAPCON` in C, likewise: conductance against the pressure in the solver, "
             "and its derivative; beyond the range the last value"
         ),
+        outside="keeps the last value, with a warning",
         tested=(
             "called by a Fortran program with the argument lists of the manuals of "
             "Abaqus (6.5 to 2017); not in Abaqus"

@@ -28,6 +28,7 @@ LANGUAGES = {
             "`GAPCON` in C, likewise: conductance against the pressure in the solver, "
             "and its derivative; beyond the range the last value"
         ),
+        outside="keeps the last value, with a warning",
         tested=(
             "called by a Fortran program with the argument lists of the manuals of "
             "CalculiX (2.7 to 2.20); linked into CalculiX 2.20, with EXPONENTIAL and "

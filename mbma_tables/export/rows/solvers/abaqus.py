@@ -80,6 +80,7 @@ abaqus = RowFormat(
         "TABULAR, and with `--conductivity` also `*GAP CONDUCTANCE, PRESSURE`, with "
         "`--friction` `*FRICTION, ELASTIC SLIP`, in one interaction"
     ),
+    outside="continues the last slope",
     tested="written according to the manual, not tested",
     read=_read,
     mark="**",

@@ -50,6 +50,7 @@ ansys = RowFormat(
     name="ansys",
     program="Ansys Mechanical APDL",
     output="a table of `PRESSURE` for the thermal contact conductance TCC",
+    outside="not tested",
     tested="written according to the manual of `*DIM` and `RMODIF` (2018), not tested",
     read=_read,
     mark="!",

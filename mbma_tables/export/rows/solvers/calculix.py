@@ -131,6 +131,7 @@ calculix = RowFormat(
         "`*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR`; EXPONENTIAL with "
         "`*GAP CONDUCTANCE`; with `--friction` `*FRICTION`"
     ),
+    outside="keeps the last value",
     tested=(
         "CalculiX 2.20: two blocks pressed together, reaction within 0.2% of the law at 30 "
         "pressures from 1e-5 of the largest on (`--pressures`), in mm-N-MPa and in SI; heat "

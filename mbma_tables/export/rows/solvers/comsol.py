@@ -37,6 +37,7 @@ comsol = RowFormat(
     name="comsol",
     program="COMSOL",
     output="columns with comments; of a film or aperture all columns",
+    outside="no value, with the settings of the header",
     tested="written according to the manual, not tested",
     read=_read,
     mark="%",

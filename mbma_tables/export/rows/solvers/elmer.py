@@ -36,6 +36,7 @@ elmer = RowFormat(
     name="elmer",
     program="Elmer",
     output="`Heat Gap Coefficient` against the contact pressure, of a boundary condition",
+    outside="continues the last slope",
     tested="written according to the source of its heat equation, not tested",
     read=_read,
     mark="!",

@@ -75,6 +75,7 @@ freecad = RowFormat(
         "a macro: the list of thermal contact conductances and pressures, the slope, and "
         "with `--friction` coefficient and stick slope, for the selected contacts"
     ),
+    outside="keeps the last value, in CalculiX",
     tested="executed with an object of these properties; CalculiX reads the lines",
     read=_read,
     mark="#",

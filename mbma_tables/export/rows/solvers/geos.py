@@ -119,6 +119,7 @@ geos = RowFormat(
         "`TableFunction`s of hydraulic aperture against jump and stress, its derivative, a "
         "fitted `BartonBandis`"
     ),
+    outside="keeps the end values, but opens with the last slope",
     tested="GEOS's checks and interpolation, written again from its source",
     read=_read,
     mark="<!--",

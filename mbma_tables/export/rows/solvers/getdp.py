@@ -59,6 +59,7 @@ getdp = RowFormat(
     name="getdp",
     program="GetDP",
     output="`InterpolationLinear` functions",
+    outside="stops below the rows, continues the last chord above them",
     tested="GetDP 3.2: to 1e-6",
     read=_read,
     mark="//",

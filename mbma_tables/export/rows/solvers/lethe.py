@@ -86,6 +86,7 @@ lethe = RowFormat(
     name="lethe",
     program="Lethe",
     output="surface slope, roughness and microhardness",
+    outside="goes on by its formula",
     tested="Lethe's formula, written again from its source: within the stated misfit",
     read=_read,
     mark="#",

@@ -72,6 +72,7 @@ lsdyna = RowFormat(
     name="lsdyna",
     program="LS-DYNA",
     output="`*DEFINE_CURVE` for each column, to be included in a deck",
+    outside="not tested",
     tested="parsed by ansys-dyna-core 0.12.1",
     read=_read,
     mark="$",

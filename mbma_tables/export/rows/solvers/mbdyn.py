@@ -142,6 +142,7 @@ mbdyn = RowFormat(
         "a [film](lubrication.md#tables-for-other-codes) as parameters: Greenwood-Tripp "
         "numbers, flow factors, micro-slip stiffness, with the keywords of the element"
     ),
+    outside="goes on by its formula",
     tested="MBDyn's formulas, written again from its source: within the stated misfit",
     read=_read,
     mark="#",

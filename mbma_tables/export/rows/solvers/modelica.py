@@ -44,6 +44,7 @@ modelica = RowFormat(
     name="modelica",
     program="Modelica",
     output="text for CombiTable",
+    outside="an error, with the settings of the header",
     tested=(
         "checked against the rules of the standard library's reader, not with the reader "
         "itself"

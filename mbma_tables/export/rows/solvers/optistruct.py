@@ -74,6 +74,7 @@ optistruct = RowFormat(
     name="optistruct",
     program="OptiStruct",
     output="`PCONT`, `TABLES1`; with `--conductivity` also `PCONTHT`, `TABLED1`",
+    outside="not tested",
     tested=(
         "written according to the manual; pyNastran 1.4.1 parses TABLES1 and TABLED1, and "
         "ignores PCONT and PCONTHT, which it does not support"
