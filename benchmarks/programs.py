@@ -663,6 +663,7 @@ PACKAGES = {
     "netcdf": "netCDF4",
     "hdf5": "netCDF4",
     "parquet": "pyarrow",
+    "xlsx": "openpyxl",
     "matlab": "scipy",
     "python-law": "numpy",
     "jax-law": "jax",

@@ -26,6 +26,13 @@ def needs(*programs):
     )
 
 
+def skip_without_package(target):
+    """Skip a test of data whose package is not installed."""
+    package = {"parquet": "pyarrow", "xlsx": "openpyxl"}.get(target)
+    if package is not None:
+        pytest.importorskip(package)
+
+
 NUMBER = re.compile(r"-?\d+\.?\d*(?:e[+-]?\d+)?")
 
 

@@ -166,7 +166,12 @@ def require_flag(name: str, value: Any) -> None:
 
 
 # of pyproject.toml, by the package that a user may lack
-EXTRAS = {"SurfaceTopography": "maps", "matplotlib": "plot", "pyarrow": "parquet"}
+EXTRAS = {
+    "SurfaceTopography": "maps",
+    "matplotlib": "plot",
+    "pyarrow": "parquet",
+    "openpyxl": "xlsx",
+}
 
 
 def needed(module: str) -> Any:

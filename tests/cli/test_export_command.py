@@ -10,6 +10,7 @@ import zipfile
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from helpers import skip_without_package
 
 from mbma_tables.cli import main
 from mbma_tables.export import CODE
@@ -56,8 +57,7 @@ OF_PRESSURE = [
 
 @pytest.mark.parametrize("target", OF_PRESSURE)
 def test_files_of_laws(target, tmp_path):
-    if target == "parquet":
-        pytest.importorskip("pyarrow")
+    skip_without_package(target)
     result = run(target, "--out", tmp_path / "law.mat", *LAW)
     assert result.exit_code == 0, result.output
     assert (tmp_path / "law.mat").stat().st_size > 500

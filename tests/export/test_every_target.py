@@ -8,6 +8,7 @@ import itertools
 import shutil
 
 import pytest
+from helpers import skip_without_package
 
 from benchmarks import programs
 from mbma_tables.export.code.languages import LANGUAGES
@@ -34,8 +35,7 @@ def rows():
 
 @pytest.mark.parametrize("name", OF_ROWS)
 def test_numbers_of_rows_are_those_of_the_library(name, rows):
-    if name == "parquet":
-        pytest.importorskip("pyarrow")
+    skip_without_package(name)
     found = [programs.in_rows(one, OF_ROWS[name], law) for one, law in rows]
     found = [one for one in found if one is not None]
     assert found

@@ -1,6 +1,7 @@
 """Films, apertures and conductances in the words of other codes: read back by their formulas, GetDP run."""
 
 import dataclasses
+import io
 import json
 import re
 import subprocess
@@ -9,7 +10,7 @@ import xml.etree.ElementTree
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from helpers import refusals, told
+from helpers import refusals, skip_without_package, told
 from law_points import needs
 
 from mbma_tables import Surface, contact_law, flow_factors
@@ -313,8 +314,7 @@ def test_getdp_interpolates(options, tmp_path):
 
 @pytest.mark.parametrize("name", DATA)
 def test_data_of_a_film_come_back(name, tmp_path):
-    if name == "parquet":
-        pytest.importorskip("pyarrow")
+    skip_without_package(name)
     film = rows_of(**FILM)
     path = tmp_path / "film"
     path.write_bytes(getattr(data, f"to_{name}")(film))
@@ -350,12 +350,24 @@ def test_data_of_a_film_come_back(name, tmp_path):
             # CF 1.11, section 2.5.1
             assert not any("_FillValue" in held[key].attrs for key in film.columns)
             found = {key: held[key][:] for key in film.columns}
+    elif name == "xlsx":
+        import openpyxl
+
+        rows, about = openpyxl.load_workbook(io.BytesIO(path.read_bytes())).worksheets
+        head, *cells = rows.iter_rows(values_only=True)
+        assert head[0] == "mean_separation [m]"
+        found = dict(zip(film.columns, np.array(cells, float).T, strict=True))
+        lines = [row[0].value for row in about]
+        assert about["B1"].value == pytest.approx(film.largest_error, rel=1e-15)
+        assert lines[2:] == list(film.comments)
     else:
         held = pytest.importorskip("pyarrow.parquet").read_table(path)
         assert json.loads(held.schema.metadata[b"units"])["pressure"] == "Pa"
         found = {key: held[key].to_numpy() for key in film.columns}
     for key, (values, _) in film.columns.items():
-        np.testing.assert_array_equal(found[key], values, err_msg=key)
+        # cells have 16 digits
+        digits = 1e-15 if name == "xlsx" else 0
+        np.testing.assert_allclose(found[key], values, rtol=digits, err_msg=key)
 
 
 def written(*words):

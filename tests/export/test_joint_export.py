@@ -14,7 +14,7 @@ import zipfile
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from helpers import compiled_law
+from helpers import compiled_law, skip_without_package
 from law_points import needs
 from test_fields import GETDP, MESH
 from test_programs import TOP, calculix, conductance, each, heated
@@ -54,8 +54,7 @@ def total(joint):
 
 @pytest.mark.parametrize("target", OF_LAWS)
 def test_every_target_takes_a_joint_with_a_name(joint, target, tmp_path):
-    if target == "parquet":
-        pytest.importorskip("pyarrow")
+    skip_without_package(target)
     kind = targets()[target]
     path = tmp_path / f"bolt{kind.end or '.txt'}"
     options = {"binaries": "none"} if target in ("fmu", "fmu3") else {}
@@ -74,6 +73,7 @@ def test_every_target_takes_a_joint_with_a_name(joint, target, tmp_path):
         "hdf5",
         "netcdf",
         "parquet",
+        "xlsx",
         "matlab",
     ):  # which are not text
         assert "bolt" in path.read_text()
@@ -86,8 +86,7 @@ ALONE = ("abaqus-gapcon", "calculix-gapcon")
 @pytest.mark.parametrize("target", OF_LAWS)
 def test_every_target_takes_a_joint_about_its_preload(joint, target, tmp_path):
     """Each file states it, or why it has no such law."""
-    if target == "parquet":
-        pytest.importorskip("pyarrow")
+    skip_without_package(target)
     kind = targets()[target]
     preloaded = joint.after("50 MPa")
     path = tmp_path / f"bolt{kind.end or '.txt'}"

@@ -9,7 +9,7 @@ import zipfile
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from helpers import refusals
+from helpers import refusals, skip_without_package
 
 from mbma_tables import Bodies, Joint, Surface, contact_law
 from mbma_tables.cli import main
@@ -50,11 +50,6 @@ def without_command(content):
     )
 
 
-def skip_without_package(target):
-    if target == "parquet":
-        pytest.importorskip("pyarrow")
-
-
 @pytest.mark.parametrize("target", OF_LAWS)
 def test_both_commands_write_the_same_file_of_a_joint(target, tmp_path):
     skip_without_package(target)
@@ -66,7 +61,7 @@ def test_both_commands_write_the_same_file_of_a_joint(target, tmp_path):
     again = run("export", target, "--joint", EXAMPLE, *named, *options_of(target))
     assert (again.exit_code, again.output) == (0, done.output)
     second = path.read_bytes()
-    if target in ("netcdf", "hdf5", "parquet", "matlab"):
+    if target in ("netcdf", "hdf5", "parquet", "xlsx", "matlab"):
         read = OF_ROWS[target].read
         for one, other in zip(read(first), read(second), strict=True):
             np.testing.assert_array_equal(one.y, other.y)

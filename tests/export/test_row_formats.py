@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from helpers import skip_without_package
 from test_code import HOSTILE
 
 from benchmarks.programs import column_of
@@ -17,7 +18,7 @@ from mbma_tables.export.targets import follows, names_of_rows
 
 OF_ROWS = targets("SOLVERS", "DATA")
 OF_REGISTRY = "mean_pressure"
-LAWS = 40  # a program; benchmarks exports has a thousand
+LAWS = 20  # a program; benchmarks exports has a thousand
 SURFACES = 4  # of which the laws are made, each in many units
 HEAT = {"conductivity": 1.0, "conductivity_unit": "W/(m K)"}
 OPTIONS = {
@@ -116,11 +117,6 @@ def quantities_of(kind):
     return [
         name for name in taken if name == "film" or follows(name) or name == OF_REGISTRY
     ]
-
-
-def skip_without_package(name):
-    if name == "parquet":
-        pytest.importorskip("pyarrow")
 
 
 @pytest.mark.parametrize("name", OF_ROWS)

@@ -1,8 +1,12 @@
-"""Contact laws as data: CSV, JSON, MATLAB, netCDF, HDF5, Parquet; each returns the bytes of a file."""
+"""Contact laws as data: CSV, JSON, MATLAB, netCDF, HDF5, Parquet, workbooks; each returns the bytes of a file."""
 
 import csv
+import datetime
 import io
 import json
+import math
+import re
+import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -14,9 +18,14 @@ from mbma_tables.common.files import written_bytes
 from mbma_tables.export.law_table import MIN_ROWS, Curve, LawTable
 from mbma_tables.export.reserved_words import matlab_words
 from mbma_tables.export.targets import Target
-from mbma_tables.export.text import checked_name, comment, csv_cell, number
+from mbma_tables.export.text import checked_name, comment, csv_cell, number, printable
 
 MAX_MATLAB_NAME = 63
+LETTERS_OF_SHEET = 31  # of its name, as spreadsheets allow
+ABOUT = "about"  # begins the names of sheets with errors and headers
+OF_CELLS = 1e-15  # of the 16 digits that openpyxl writes
+EPOCH = datetime.datetime(1980, 1, 1)
+MODIFIED = re.compile(rb"(<dcterms:modified[^>]*>)[^<]*(</dcterms:modified>)")
 # what a function takes, and where the rows are in the file
 OF_ONE = {"arguments": "x", "place": ""}
 OF_SEVERAL = {"arguments": "x, quantity", "place": ".(quantity)"}
@@ -230,6 +239,53 @@ def to_parquet(law: LawTable) -> bytes:
     return stream.getvalue()
 
 
+def to_xlsx(law: LawTable | Sequence[LawTable]) -> bytes:
+    """A workbook: a sheet of rows for each law, and one with its errors, validity and the other lines of its header."""
+    openpyxl = needed("openpyxl")
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for one in [law] if isinstance(law, LawTable) else law:
+        sheet = book.create_sheet(one.quantity[:LETTERS_OF_SHEET])
+        names = [f"{name} [{unit}]" for name, (_, unit) in one.columns.items()]
+        _append(sheet, names)
+        columns = [values.tolist() for values, _ in one.columns.values()]
+        for row in zip(*columns, strict=True):
+            # an empty cell where a number is not known
+            sheet.append([value if math.isfinite(value) else None for value in row])
+        about = book.create_sheet(f"{ABOUT} {one.quantity}"[:LETTERS_OF_SHEET])
+        about.append(["largest error", one.largest_error])
+        _append(about, ["theory", one.theory])
+        for line in one.comments:
+            _append(about, [line])
+    book.properties.created = book.properties.modified = EPOCH
+    stream = io.BytesIO()
+    book.save(stream)
+    return _without_times(stream.getvalue())
+
+
+def _append(sheet: Any, texts: Sequence[str]) -> None:
+    """A row of texts, none of which is a formula."""
+    sheet.append([printable(text) for text in texts])
+    for cell in sheet[sheet.max_row]:
+        cell.data_type = "s"
+
+
+def _without_times(content: bytes) -> bytes:
+    """The same archive with one time for all files, for identical bytes."""
+    stream = io.BytesIO()
+    with (
+        zipfile.ZipFile(io.BytesIO(content)) as given,
+        zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as written,
+    ):
+        for name in sorted(given.namelist()):
+            text = given.read(name)
+            if name == "docProps/core.xml":
+                # openpyxl writes the time of saving
+                text = MODIFIED.sub(rb"\g<1>1980-01-01T00:00:00Z\g<2>", text)
+            written.writestr(zipfile.ZipInfo(name), text)
+    return stream.getvalue()
+
+
 def _matlab_files(law: LawTable | Sequence[LawTable], name: str) -> dict[str, bytes]:
     return {"": to_matlab(law), ".m": matlab_reader(law, name)}
 
@@ -301,6 +357,21 @@ def read_netcdf(content: bytes) -> list[Curve]:
     return curves
 
 
+def read_xlsx(content: bytes) -> list[Curve]:
+    """Columns of the sheets of rows."""
+    book = needed("openpyxl").load_workbook(io.BytesIO(content), read_only=True)
+    curves = []
+    for sheet in book.worksheets:
+        if sheet.title.startswith(ABOUT):
+            continue
+        head, *rows = sheet.iter_rows(values_only=True)
+        names = [str(cell).partition(" [")[0] for cell in head]
+        columns = np.array(rows, dtype=float).T
+        for curve in _curves(dict(zip(names, columns, strict=True))):
+            curves.append(curve._replace(rtol=OF_CELLS))
+    return curves
+
+
 def read_parquet(content: bytes) -> list[Curve]:
     """Columns of the table."""
     table = needed("pyarrow.parquet").read_table(io.BytesIO(content))
@@ -341,6 +412,15 @@ TARGETS = (
         several=True,
     ),
     _target("parquet", to_parquet, read_parquet, "pyarrow"),
+    _target(
+        "xlsx",
+        to_xlsx,
+        read_xlsx,
+        "openpyxl 3.1",
+        "a workbook: a sheet of rows with units for each quantity, and one with its error, "
+        "validity and header",
+        several=True,
+    ),
     _target(
         "matlab",
         _matlab_files,
