@@ -91,3 +91,11 @@ def test_the_stiffness_of_a_map_that_falls_with_pressure_keeps_its_rows():
     one = programs.case(81, "map")
     law = programs.rows(one, "tangential_stiffness")
     assert programs.in_rows(one, OF_ROWS["csv"], law).share <= 1
+
+
+def test_a_film_without_a_valid_factor_states_its_errors():
+    """They were stated as zero."""
+    one = programs.case(171, "joint")
+    law = programs.rows(one, "film")
+    assert programs.in_rows(one, OF_ROWS["csv"], law).share <= 1
+    assert law.largest_error > 0

@@ -367,8 +367,8 @@ def read_xlsx(content: bytes) -> list[Curve]:
         head, *rows = sheet.iter_rows(values_only=True)
         names = [str(cell).partition(" [")[0] for cell in head]
         columns = np.array(rows, dtype=float).T
-        for curve in _curves(dict(zip(names, columns, strict=True))):
-            curves.append(curve._replace(rtol=OF_CELLS))
+        found = _curves(dict(zip(names, columns, strict=True)))
+        curves += [curve._replace(rtol=OF_CELLS) for curve in found]
     return curves
 
 

@@ -626,7 +626,10 @@ def _film_rows(
         np.asarray(exported.answer(u).unloading_stiffness),
         f"{stress}/{length}",
     )
-    pressed = middle.valid & (middle.pressure > floor)
+    # where no factor is valid, errors are those at every gap
+    of_valid = bool(middle.valid.any())
+    measured = middle.valid | (not of_valid)
+    pressed = measured & (middle.pressure > floor)
     errors = {}  # largest of linear interpolation, in the middle of the intervals
     for name, (value, _) in columns.items():
         between = (
@@ -634,16 +637,19 @@ def _film_rows(
             if name == "stiffness"
             else getattr(middle, name)
         )
-        kept = pressed if name in OF_SPOTS else middle.valid & (between > 0)
+        kept = pressed if name in OF_SPOTS else measured & (between > 0)
         off = (value[1:] + value[:-1])[kept] / (2 * between[kept]) - 1
         errors[name] = float(np.abs(off).max(initial=0.0))
     error = max(errors[name] for name in FILM_NAMES)
+    where = (
+        "where flow factors are valid" if of_valid else "at all gaps, none being valid"
+    )
     listed = ", ".join(f"{name} {bound(value)}" for name, value in errors.items())
     gaps = {reason: found.mean_separation[bad] for reason, bad in found.reasons.items()}
     comments = exported.header(
         f"{', '.join(f'{name} [{unit}]' for name, (_, unit) in columns.items())} against mean_separation [{length}]",
         f"mean separation u from {number(u[0])} to {number(u[-1])} {length}",
-        f"{rows} rows; largest errors of linear interpolation, relative, where flow factors are valid: {listed}; of "
+        f"{rows} rows; largest errors of linear interpolation, relative, {where}: {listed}; of "
         f"{', '.join(OF_SPOTS)} at pressures above {about(floor)} {stress}",
         "flow along x is -phi_x u^3/(12 viscosity) dp/dx + (U1 + U2)/2 u + (U1 - U2)/2 h_rms shear_x",
         "stiffness is that of a small change of the gap, with the contact area as it is",
