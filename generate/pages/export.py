@@ -7,8 +7,15 @@ from collections.abc import Iterable
 
 from generate.files import ROOT
 from generate.page import Measured, table
-from mbma_tables.export.registry import targets
-from mbma_tables.export.targets import Target
+from mbma_tables.export.registry import OF_LAWS, declared_options, targets
+from mbma_tables.export.targets import Options, Target, names_of
+
+# what targets write, by their groups
+KINDS = {
+    "all rows": ("SOLVERS", "DATA"),
+    "all laws as code": ("LAWS",),
+    "FMUs": ("FMUS",),
+}
 
 # written by `python -m benchmarks exports --write`
 MEASURED = ROOT / "docs" / "data" / "exports.csv"
@@ -25,8 +32,8 @@ def formats() -> Measured:
     for name, target in targets("LAWS", "FMUS", "CODE").items():
         code.append((f"`{name}`", target.output, target.tested))
     of_code = table("target | output | tested with", code)
-    blocks = {"code": of_code, "formats": table(header, rows), "programs": _programs()}
-    return blocks, {}
+    blocks = {"code": of_code, "formats": table(header, rows), "options": _options()}
+    return blocks | {"programs": _programs()}, {}
 
 
 def _programs() -> str:
@@ -44,6 +51,32 @@ def _programs() -> str:
         "outside the range | date"
     )
     return table(header, rows)
+
+
+def _options() -> str:
+    """Options of files, by the classes that declare them."""
+    rows = []
+    for name, declared in declared_options(*OF_LAWS).items():
+        kind = declared.metadata["kind"]
+        words = f"`--{'without-' if kind == 'off' else ''}{name.replace('_', '-')}`"
+        of = "; ".join(_takers(name))
+        rows.append((f"`{name}`", words if kind else "", of, declared.metadata["help"]))
+    return table("name | in a shell | targets | what it is", rows)
+
+
+def _takers(option: str) -> Iterable[str]:
+    """Targets that have an option, by what they write."""
+    of_all = option in Options.names()
+    for label, groups in KINDS.items():
+        takers = []
+        others = []
+        for name, target in targets(*groups).items():
+            taken = of_all or option in target.takes & names_of(target.options)
+            (takers if taken else others).append(f"`{name}`")
+        if takers and len(others) < len(takers):
+            yield f"{label} but {', '.join(others)}" if others else label
+        elif takers:
+            yield ", ".join(takers)
 
 
 def _quantities(target: Target) -> str:

@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from mbma_tables.export.law_table import LawTable
     from mbma_tables.export.request import Subject
 
-DEFAULTS = {"variant": "reported", "check": False}
+DEFAULTS = {"variant": "reported"}
 
 
-class _Export(click.Command):
+class _Export(options.WithFileOptions):
     """The command, whose help lists the targets."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -63,7 +63,6 @@ class _Export(click.Command):
     help="In place of a surface: rows that `mbma export json` wrote, for other programs.",
 )
 @options.optional_specimen_options
-@options.file_options
 @click.option(
     "--conductivity",
     type=float,
@@ -89,15 +88,6 @@ class _Export(click.Command):
 @options.hardness_option
 @options.largest_pressure_option
 @options.variant_option
-@click.option(
-    "--table",
-    help="Of the whole model: FILE.nc of a table, or island4d, in place of the shipped universal one.",
-)
-@click.option(
-    "--check",
-    is_flag=True,
-    help="Of the whole model: build it and replay its conformance points.",
-)
 def export_command(target: str, out: Path, asked: dict[str, Any], **values: Any) -> None:
     """Write TARGET to a file.
 
@@ -126,7 +116,7 @@ def export_command(target: str, out: Path, asked: dict[str, Any], **values: Any)
         sources.append("specimen")
     _refuse_unused(kind, [*given, *(sources if code else ())], code)
     if code:
-        _export_code(out, values["variant"], values["table"], "check" in given)
+        _export_code(out, values["variant"], **asked)
         return
     subject: Subject | list[LawTable]
     made_by = (*_inputs(), written_by(_context().obj[1:]))
@@ -143,8 +133,7 @@ def export_command(target: str, out: Path, asked: dict[str, Any], **values: Any)
         raise InputError("--joint and --law are both given: give one of them")
     else:
         subject = _subject_of_surface(kind, surface, given)
-    request = Options(**asked, **units, made_by=made_by)
-    write_export(subject, target, request, out)
+    write_export(subject, target, {**asked, **units, "made_by": made_by}, out)
 
 
 def _context() -> click.Context:
@@ -159,11 +148,7 @@ def _word(name: str) -> str:
 
 def _refuse_unused(kind: Target, given: Iterable[str], code: bool = False) -> None:
     """Refuse options without effect."""
-    taken = (
-        kind.takes
-        if code
-        else kind.takes | {"name", "heat", "length_unit", "stress_unit"}
-    )
+    taken = kind.takes if code else kind.takes | Options.names().keys()
     unused = [_word(name) for name in sorted(given) if name not in taken]
     if unused:
         raise InputError(
@@ -248,7 +233,7 @@ def _inputs() -> Iterator[str]:
 
 
 def write_export(
-    subject: Subject | list[LawTable], target: str, request: Options, out: Path
+    subject: Subject | list[LawTable], target: str, given: Mapping[str, Any], out: Path
 ) -> None:
     """Write a subject for a program, and say at which of the pressures asked for it is not valid."""
     from mbma_tables.export.request import files_of
@@ -256,11 +241,11 @@ def write_export(
     require_name("target", target, targets())
     kind = targets()[target]
     if target not in targets("CODE"):
-        _refuse_unused(kind, request.of_some_targets())
+        _refuse_unused(kind, [name for name in given if name not in Options.names()])
     to_screen = str(out) == "-"
     if to_screen:
         require_alone(kind)
-    written = files_of(subject, target, request, None if to_screen else out)
+    written = files_of(subject, target, given, None if to_screen else out)
     for line in written.doubts:
         echo(line, err=True)
     show_written(kind, out, written.files)
@@ -292,7 +277,9 @@ def require_alone(kind: Target) -> None:
         )
 
 
-def _export_code(folder: Path, variant: str, table: str | None, check: bool) -> None:
+def _export_code(
+    folder: Path, variant: str, table: str | None = None, check: bool = False
+) -> None:
     from mbma_tables.export.model import c_code
 
     for path in c_code.write_code(folder, variant, table):

@@ -361,65 +361,63 @@ def _names(ctx: click.Context, param: click.Parameter, given: str | None) -> Any
     return None if given is None else given.split(",")
 
 
-# of files for other programs, of a surface (`mbma export`) or a joint (`mbma joint --export`)
-file_options = option_group(
-    "asked",
-    given_values,
-    click.option(
-        "--pressures",
-        metavar="X:X",
-        callback=_pair,
-        help="Smallest and largest pressure: where the error holds, and the rows end.",
-    ),
-    click.option(
-        "--name",
-        help="Of the interaction, table, functions or module; else in the comments.",
-    ),
-    click.option(
-        "--quantity",
-        metavar="NAME[,NAME]",
-        callback=_names,
-        help="Of the rows, any that contacts have, else the usual one; several for some programs.",
-    ),
-    click.option("--rows", type=int, help="Number of rows; else as few as --rtol needs."),
-    click.option(
-        "--rtol",
-        type=float,
-        help="Largest relative error of linear interpolation; 1e-3 by default.",
-    ),
-    quantity_option(
-        "--friction-pressure",
-        help="At which a friction card's stiffness holds; else amid --pressures.",
-    ),
-    click.option(
-        "--leakage",
-        is_flag=True,
-        default=None,
-        help="Flow coefficient of the gaps: rows of it alone, laws as code with it.",
-    ),
-    click.option(
-        "--direction",
-        metavar="x|y|DEGREES",
-        help="Of leakage of a map; else the mean of both axes.",
-    ),
-    click.option(
-        "--without-heat",
-        "heat",
-        flag_value=False,
-        default=None,
-        help="Leave conductance out.",
-    ),
-    click.option(
-        "--peklenik",
-        type=float,
-        help="Of a film: length of the roughness along x over that along y.",
-    ),
-    click.option(
-        "--binaries",
-        type=click.Choice(["here", "all", "none"]),
-        help="In an FMU: for this platform, for all by zig, or none.",
-    ),
-)
+# of the command line, by kinds of options of files
+_KINDS: dict[str, dict[str, Any]] = {
+    "text": {},
+    "whole": {"type": int},
+    "number": {"type": float},
+    "names": {"callback": _names, "metavar": "NAME[,NAME]"},
+    "quantity": {"callback": _parse_number, "metavar": "X[UNIT]"},
+    "range": {"callback": _pair, "metavar": "X:X"},
+    "flag": {"is_flag": True},
+    "off": {"flag_value": False},
+}
+
+
+@functools.cache
+def _file_options(*groups: str) -> tuple[click.Option, ...]:
+    """Options of files for other programs, as the targets of some groups or of all declare them."""
+    from mbma_tables.export.registry import declared_options
+
+    made = []
+    for name, field in declared_options(*groups).items():
+        kind = field.metadata["kind"]
+        words = f"--{'without-' if kind == 'off' else ''}{name.replace('_', '-')}"
+        how = _KINDS.get(kind) or (
+            {"type": click.Choice(kind.split("|"))} if "|" in kind else {}
+        )
+        if kind:
+            help = field.metadata["help"]
+            made.append(click.Option([words, name], help=help, default=None, **how))
+    return tuple(made)
+
+
+class WithFileOptions(click.Command):
+    """A command that takes the options of files for other programs; it receives those given as `asked`.
+
+    They are those of all targets, or of some groups of them.
+    """
+
+    def __init__(self, *args: Any, groups: Sequence[str] = (), **options: Any) -> None:
+        super().__init__(*args, **options)
+        self._groups = tuple(groups)
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """Its own options, those of files, and --help."""
+        own = super().get_params(ctx)
+        names = {each.name for each in own}
+        declared = _file_options(*self._groups)
+        more = [each for each in declared if each.name not in names]
+        return [*own[:-1], *more, own[-1]]
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Call the command with the options of files as one argument."""
+        own = {each.name for each in self.params}
+        more = [name for name in ctx.params if name not in own]
+        ctx.params["asked"] = given_values({name: ctx.params.pop(name) for name in more})
+        return super().invoke(ctx)
+
+
 # of a command that takes a surface or something else: as they were given
 optional_specimen_options = option_group("specimen", dict, *_SPECIMEN_OPTIONS)
 

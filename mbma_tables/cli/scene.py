@@ -20,14 +20,12 @@ from mbma_tables.cli.format import (
 )
 from mbma_tables.cli.options import (
     Output,
+    WithFileOptions,
     check_plot,
     draws_options,
     face_options,
-    file_options,
-    given_values,
     json_option,
     numbers_option,
-    option_group,
     output_options,
     plot_option,
 )
@@ -35,7 +33,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import MAX_BYTES, read_file, write_file, written_bytes
 from mbma_tables.common.progress import echo
 from mbma_tables.common.toml_files import read_toml, set_entry, with_settings
-from mbma_tables.export.targets import Options
+from mbma_tables.export.registry import OF_LAWS
 from mbma_tables.export.text import written_by
 from mbma_tables.surfaces.surface import assumptions
 
@@ -175,22 +173,8 @@ def _export_joint(
     if file is not None:
         digest = hashlib.sha256(read_file(file, MAX_BYTES)).hexdigest()
         made_by.insert(0, f"input {file}: sha256 {digest}")
-    request = Options(**options, made_by=tuple(made_by))
-    write_export(_joint(file, entries).subject(), target, request, out)
-
-
-_joint_options = option_group(
-    "export",
-    given_values,
-    click.option(
-        "--export",
-        "target",
-        metavar="TARGET",
-        help="Write for another program: a target of `mbma export`.",
-    ),
-    click.option("--length-unit", metavar="UNIT", help="Of the file; mm by default."),
-    click.option("--stress-unit", metavar="UNIT", help="Of the file; MPa by default."),
-)
+    given = {**options, "made_by": tuple(made_by)}
+    write_export(_joint(file, entries).subject(), target, given, out)
 
 
 @click.command("batch", short_help="A joint for each row of a table of designs.")
@@ -302,7 +286,10 @@ def _report_of_ranges(
 
 
 @click.command(
-    "joint", short_help="Stiffness, area, gap and conductance of two metal parts."
+    "joint",
+    cls=WithFileOptions,
+    groups=OF_LAWS,
+    short_help="Stiffness, area, gap and conductance of two metal parts.",
 )
 @click.argument("file", type=click.Path(path_type=Path), required=False)
 @settings_option
@@ -320,8 +307,12 @@ def _report_of_ranges(
 )
 @plot_option
 @draws_options
-@_joint_options
-@file_options
+@click.option(
+    "--export",
+    "target",
+    metavar="TARGET",
+    help="Write for another program: a target of `mbma export`.",
+)
 @output_options
 def joint_command(
     file: Path | None,
@@ -332,7 +323,7 @@ def joint_command(
     plot: Path | None,
     drawn: dict[str, Any],
     output: Output,
-    export: dict[str, Any],
+    target: str | None,
     asked: dict[str, Any],
 ) -> None:
     """Interface laws of the joint in FILE (TOML: bodies, nominal_area, part_a, part_b) at pressures.
@@ -355,20 +346,19 @@ def joint_command(
 
     Example: mbma joint examples/joint.toml --set part_a.longest='0.25..0.8 mm' --pressure 10MPa
     """
-    export |= asked
     entries = _entries(file, settings, face)
-    if "target" in export:
+    if target is not None:
         if pressure or force or plot is not None or output.as_json or output.as_csv:
             raise InputError(
                 "--export writes the joint: leave --pressure, --force, --plot, --json and --csv out"
             )
         if output.out is None:
             raise InputError("--export needs --out, the file to write")
-        _export_joint(file, entries, output.out, **export)
+        _export_joint(file, entries, output.out, target, **asked)
         return
-    if export:
+    if asked:
         raise InputError(
-            f"{', '.join(_flag(name) for name in export)} belong to --export TARGET"
+            f"{', '.join(_flag(name) for name in asked)} belong to --export TARGET"
         )
     if bool(pressure) == bool(force):
         raise InputError(

@@ -908,21 +908,9 @@ class Joint(JointQuantities, Displayed):
         self,
         target: str,
         pressures: tuple[float | str, float | str] | None = None,
-        name: str | None = None,
-        heat: bool | None = None,
-        friction_pressure: float | str | None = None,
         *,
         path: str | os.PathLike[str] | None = None,
-        quantity: str | Sequence[str] | None = None,
-        rows: int | None = None,
-        rtol: float | None = None,
-        length_unit: str | None = None,
-        stress_unit: str | None = None,
-        leakage: bool = False,
-        direction: str | float | None = None,
-        peklenik: float | None = None,
-        binaries: str | None = None,
-        made_by: tuple[str, ...] = (),
+        **options: Any,
     ) -> str | bytes | list[pathlib.Path]:
         """The joint as input of a solver, as data or as code, for every target of laws of `mbma export`.
 
@@ -937,40 +925,17 @@ class Joint(JointQuantities, Displayed):
             "csv", functions such as "c-law", "modelica-law" and "fmu".
         pressures : pair of float or str
             Smallest and largest pressure of rows; plain numbers in the unit of stress of the file.
-        name : str, optional
-            Name of the surface interaction or of the functions, or what names begin with;
-            formats without names have it in their comments.
-        heat : bool, optional
-            Whether the conductance is also written. By default it is; code leaves it out,
-            as its comments say, where the joint has no thermal conductivity.
-        friction_pressure : float or str, optional
-            Pressure at which a friction card's tangential stiffness is computed; default:
-            the geometric mean.
         path : path-like, optional
             File to write, and beside it those that belong to it, by the end that the target
             gives them.
-        quantity : str or sequence of str, optional
-            Of the rows, as for `describe_law`: data, and programs that interpolate any
-            table, take every quantity of a contact. Several where the program takes
-            them, as docs/export.md lists. Default: "total_conductance", in a vacuum
-            "solid_conductance", with the pressure in solvers that have both; without `heat`
-            pressure.
-        rows, rtol : int and float, optional
-            Number of rows, or their largest error of linear interpolation; by default as
-            few rows as 1e-3 needs, or as many as the program keeps.
-        length_unit, stress_unit : str, optional
-            Of the file: mm and MPa, with conductance in mW/(mm^2 K), or those that the
-            program prescribes.
-        leakage : bool
-            Functions have the flow coefficient of the gaps, too; rows have it alone.
-        direction : str or float, optional
-            Of leakage of a map, as for `describe_law`.
-        peklenik : float, optional
-            Of a film, as for `flow_factors`.
-        binaries : {"here", "all", "none"}, optional
-            Of an FMU.
-        made_by : sequence of str
-            Lines of the header on how the file was made.
+        **options
+            Of the target, by the names of the options of `mbma export` with _ for -, and
+            with the same defaults: docs/export.md has a table of them. `name` is that of
+            the interaction or of the functions, `quantity` a name or several, `rows` and
+            `rtol` the number of rows or their largest error, `length_unit` and `stress_unit`
+            those of the file. `heat=False` leaves conductance out, which is written by
+            default where bodies have a thermal conductivity; `made_by` has lines of the
+            header on how the file was made.
 
         Returns
         -------
@@ -998,25 +963,9 @@ class Joint(JointQuantities, Displayed):
         ['*SURFACE INTERACTION, NAME=JOINT', '*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL']
         """
         from mbma_tables.export.request import exported
-        from mbma_tables.export.targets import Options
 
-        options = Options(
-            pressures=pressures,
-            name=name,
-            heat=heat,
-            friction_pressure=friction_pressure,
-            quantity=quantity,
-            length_unit=length_unit,
-            stress_unit=stress_unit,
-            made_by=made_by,
-            rows=rows,
-            rtol=rtol,
-            leakage=leakage,
-            direction=direction,
-            peklenik=peklenik,
-            binaries=binaries,
-        )
-        return exported(self.subject(), target, options, path)
+        given = {"pressures": pressures, **options}
+        return exported(self.subject(), target, given, path)
 
     def subject(self) -> Subject:
         """What an export needs of the joint."""

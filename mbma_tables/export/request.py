@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from mbma_tables import __version__
 from mbma_tables.bodies.bodies import Bodies, BodiesInUnits
-from mbma_tables.common.arguments import require_flag, require_name
+from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import HEAT_CONDUCTANCE, factor
 from mbma_tables.contacts.law.law import ContactLaw
@@ -26,16 +26,17 @@ from mbma_tables.contacts.quantities.tangential import ratio_on
 from mbma_tables.export.code.languages import LANGUAGES
 from mbma_tables.export.exported_law import GasInGaps
 from mbma_tables.export.law_table import FILM, LawTable
-from mbma_tables.export.registry import targets
+from mbma_tables.export.registry import declared_options, targets
 from mbma_tables.export.rows.law_rows import describe_law
 from mbma_tables.export.targets import (
     CONDUCTANCES,
     Options,
+    RowOptions,
     Target,
+    checked_names,
     follows,
     has_gas,
     options_of,
-    require_quantity,
     write_files,
 )
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -118,19 +119,20 @@ def export_law(
     >>> export_law(law, "optistruct", rows=20).count("TABLES1*")
     1
     """
-    request = Options(pressures=pressures, **options)
-    return exported(subject_of_law(law), target, request, path)
+    return exported(
+        subject_of_law(law), target, {"pressures": pressures, **options}, path
+    )
 
 
 def exported(
-    subject: Subject, target: str, options: Options, path: Any = None
+    subject: Subject, target: str, given: Mapping[str, Any], path: Any = None
 ) -> str | bytes | list[pathlib.Path]:
     """The first file of a target, as text where it is; with a path the paths of all files."""
     try:
         out = None if path is None else pathlib.Path(path)
     except TypeError:
         raise InputError(f"path must be that of a file, got {path!r}") from None
-    files = files_of(subject, target, options, out).files
+    files = files_of(subject, target, given, out).files
     if out is not None:
         return write_files(out, files)
     try:
@@ -142,7 +144,7 @@ def exported(
 def files_of(
     subject: Subject | Sequence[LawTable],
     target: str,
-    options: Options,
+    asked: Mapping[str, Any],
     out: pathlib.Path | None = None,
 ) -> Written:
     """The files of a target, of a subject or of rows that were written before.
@@ -155,51 +157,37 @@ def files_of(
         the path `out`.
     """
     program = _target_of_laws(target)
-    given = options.of_some_targets()
-    if options.leakage is not None:
-        require_flag("leakage", options.leakage)
-        given["leakage"] = options.leakage
-        if not options.leakage:
-            del given["leakage"]
-    if options.heat is not None:
-        require_flag("heat", options.heat)
-    made_by = _made_by(target, options.made_by)
+    require_options(asked)
     if not isinstance(subject, Subject):
-        return _of_rows(subject, program, options, out)
+        return _of_rows(subject, program, asked, out)
+    options = program.given_options(asked)
     _refuse_adhesion(subject)
     units = _units(subject, program, options)
-    _refuse(target, [key for key in given if key not in program.takes])
     if out is None and not program.alone:
         raise InputError(
             f"{target} is several files, of which the first needs the others: give path"
         )
     named, line_of_name = program.place_of_name(options.name, out)
-    shared = {"theory": subject.theory, "hardness": subject.hardness, **units, **given}
+    shared: dict[str, Any] = {"theory": subject.theory, "hardness": subject.hardness}
+    shared |= units
+    shared |= options.given()
     if subject.largest_pressure is not None:
         shared["largest_pressure"] = subject.largest_pressure
     if subject.variant != "reported":
         shared["variant"] = subject.variant
-    shared["made_by"] = (*line_of_name, *made_by)
-    if program.rows:
+    shared["made_by"] = (*line_of_name, *_made_by(target, options.made_by))
+    if isinstance(options, RowOptions):
         laws = _all_rows(subject, program, options, shared)
         files = program.files(laws[0] if len(laws) == 1 else laws, **named)
         return Written(files, _doubts(laws) if options.pressures is not None else ())
-    of_rows = {
-        "pressures": options.pressures,
-        "quantity": options.quantity,
-        "friction_pressure": options.friction_pressure,
-    }
     bodies: float | str | Bodies = subject.E_star
-    if "quantity" in program.takes and of_rows.pop("quantity") is not None:
-        shared["quantity"] = _names(options.quantity)
-        if subject.bodies is not None:
-            # those of the contact itself
-            del shared["hardness"]
-            shared.pop("largest_pressure", None)
-            bodies = subject.bodies
-            shared["interface"] = subject.interface
-    _refuse(target, [key for key, value in of_rows.items() if value is not None])
-    if options.direction is not None and not options.leakage:
+    if "quantity" in shared and subject.bodies is not None:
+        # those of the contact itself
+        del shared["hardness"]
+        shared.pop("largest_pressure", None)
+        bodies = subject.bodies
+        shared["interface"] = subject.interface
+    if "direction" in shared and "leakage" not in shared:
         raise InputError("direction is of leakage: ask for leakage or leave it out")
     shared |= _of_code(subject, target, units, options.heat)
     return Written(program.files(subject.surface, bodies, **shared, **named), ())
@@ -208,7 +196,7 @@ def files_of(
 def _of_rows(
     laws: Sequence[LawTable],
     program: Target,
-    options: Options,
+    asked: Mapping[str, Any],
     out: pathlib.Path | None,
 ) -> Written:
     """Files of rows that were written before, whose comments stay."""
@@ -216,16 +204,16 @@ def _of_rows(
         raise InputError(
             f"{program.name} is made from a surface or a joint, not from rows"
         )
-    unchanged = dataclasses.replace(options, name=None, made_by=())
     given = [
-        field.name
-        for field in dataclasses.fields(options)
-        if getattr(unchanged, field.name) not in (None, ())
+        name
+        for name, value in asked.items()
+        if value is not None and name not in ("name", "made_by")
     ]
     if given:
         raise InputError(f"rows are written as they are: leave {' and '.join(given)} out")
+    options = program.given_options(asked)
     named, line_of_name = program.place_of_name(options.name, out)
-    more = (*line_of_name, *options.made_by)
+    more = (*line_of_name, *(options.made_by or ()))
     again = [dataclasses.replace(law, comments=(*law.comments, *more)) for law in laws]
     if len(again) > 1 and not program.several:
         listed = [law.quantity for law in again]
@@ -237,19 +225,22 @@ def _of_rows(
 
 def _made_by(target: str, lines: Any) -> tuple[str, ...]:
     """Lines of the header on how the file was made."""
-    if isinstance(lines, str) or not isinstance(lines, Sequence):
-        raise InputError(f"made_by must be lines of text, got {lines!r}")
-    for line in lines:
-        if not isinstance(line, str):
-            raise InputError(f"made_by must be lines of text, got {line!r} among them")
     by_default = f"written from Python by mbma_tables {__version__}: a joint for {target}"
-    return tuple(lines) or (by_default,)
+    return tuple(lines or ()) or (by_default,)
+
+
+def require_options(given: Mapping[str, Any]) -> None:
+    """Refuse names that are no options of any target."""
+    for name in given:
+        require_name("option of exports", name, declared_options())
 
 
 def _all_rows(
-    subject: Subject, program: Target, options: Options, shared: dict[str, Any]
+    subject: Subject, program: Target, options: RowOptions, shared: dict[str, Any]
 ) -> list[LawTable]:
     """Rows of one quantity, or of several."""
+    for name in ("pressures", "quantity", "friction_pressure"):
+        shared.pop(name, None)
     leakage = shared.pop("leakage", False)
     wanted = _quantities(subject, program, options, leakage)
     flows = [name for name in wanted if follows(name) == flow_coefficient.name]
@@ -266,10 +257,10 @@ def _all_rows(
         shared["friction"] = subject.friction
         shared["friction_pressure"] = options.friction_pressure
     elif options.friction_pressure is not None:
-        _refuse(program.name, ["friction_pressure"])
+        raise InputError(f"without effect on {program.name}: leave friction_pressure out")
     if subject.bodies is None:
         _refuse_unused(subject, wanted)
-    return [_rows(subject, program, one, shared, rubbed, options) for one in wanted]
+    return [_rows(subject, program, one, shared, rubbed) for one in wanted]
 
 
 def _refuse_unused(subject: Subject, wanted: Sequence[str]) -> None:
@@ -289,7 +280,7 @@ def _refuse_unused(subject: Subject, wanted: Sequence[str]) -> None:
 
 
 def _quantities(
-    subject: Subject, program: Target, options: Options, leakage: bool
+    subject: Subject, program: Target, options: RowOptions, leakage: bool
 ) -> list[str]:
     """Names of the quantities of rows: those asked for, else the usual one of the program."""
     quantity = options.quantity
@@ -297,24 +288,10 @@ def _quantities(
         return ["leakage"] if leakage else [_usual(subject, program, options.heat)]
     if leakage:
         raise InputError("quantity and leakage are both given: give quantity='leakage'")
-    names = _names(quantity)
+    names = checked_names("quantity", quantity)
     if len(names) > 1 and not program.several:
         raise InputError(f"{program.name} has one quantity a file: give one of {names}")
     return names
-
-
-def _names(quantity: Any) -> list[str]:
-    """Names of quantities, of which each is one."""
-    names = [quantity] if isinstance(quantity, str) else quantity
-    if not isinstance(names, Sequence) or not names:
-        raise InputError(f"quantity must be a name or several, got {quantity!r}")
-    for name in names:
-        if not isinstance(name, str):
-            raise InputError(f"quantity must be a name or several, got {quantity!r}")
-        require_quantity(name)
-    if len(set(names)) < len(names):
-        raise InputError(f"quantity has the same name twice: {quantity!r}")
-    return list(names)
 
 
 def _target_of_laws(target: Any) -> Target:
@@ -358,11 +335,6 @@ def _refuse_adhesion(subject: Subject) -> None:
         "the first contact; contact(..., pressure=[...]).to_dataset() has rows of every "
         "quantity"
     )
-
-
-def _refuse(target: str, names: list[str]) -> None:
-    if names:
-        raise InputError(f"without effect on {target}: leave {' and '.join(names)} out")
 
 
 def _usual(subject: Subject, program: Target, heat: bool | None) -> str:
@@ -438,7 +410,6 @@ def _rows(
     quantity: str,
     shared: Mapping[str, Any],
     rubbed: bool,
-    options: Options,
 ) -> LawTable:
     """Rows of one quantity."""
     asked = dict(shared)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import dataclasses
 import pathlib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field
 from typing import Any
 
-from mbma_tables.common.arguments import require_name
+import numpy as np
+
+from mbma_tables.common.arguments import require_flag, require_name
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
 from mbma_tables.contacts.quantities.conductances import GAS
@@ -20,14 +23,13 @@ from mbma_tables.contacts.quantities.registry import (
 from mbma_tables.export.law_table import FILM, Curve, LawTable
 from mbma_tables.export.text import checked_name, comment
 
+# of a law that is not of a joint, whose file has them
 LAW = frozenset(
     {
         *("theory", "variant", "hardness", "largest_pressure"),
         *("conductivity", "conductivity_unit", "kappa"),
     }
 )
-ROWS = LAW | {"rows", "rtol", "pressures", "leakage", "quantity", "peklenik", "direction"}
-CODE = LAW | {"name", "leakage", "direction", "quantity"}
 FRICTION = {"kappa", "friction", "friction_pressure"}
 SI = ("m", "Pa")
 STAY_WITHIN_ROWS = (
@@ -68,30 +70,166 @@ def options_of(name: str) -> set[str]:
     return options
 
 
+def option(
+    help: str, kind: str = "text", check: Callable[[str, Any], Any] | None = None
+) -> dict[str, Any]:
+    """What is declared of an option of a file beside its name and its default, None, that it was not given.
+
+    Parameters
+    ----------
+    help : str
+        What it does, in the command's help and in docs/export.md.
+    kind : str
+        How the command reads it: "text", "names" with commas between them, "whole" or
+        "number", "quantity" with a unit, "range" of two of these, "flag", "off" for a flag
+        that is called --without-NAME, or words with a bar between them, of which it is one.
+        It is no option of the command where this is empty.
+    check : callable, optional
+        Called with its name and value, raises an `InputError` for wrong ones; writers check
+        those that depend on the law.
+    """
+    return {"help": help, "kind": kind, "check": check}
+
+
+def checked_names(name: str, value: Any) -> list[str]:
+    """Names of quantities of rows, of which each is one."""
+    names = [value] if isinstance(value, str) else value
+    if not isinstance(names, Sequence) or not names:
+        raise InputError(f"{name} must be a name or several, got {value!r}")
+    for one in names:
+        if not isinstance(one, str):
+            raise InputError(f"{name} must be a name or several, got {value!r}")
+        require_quantity(one)
+    if len(set(names)) < len(names):
+        raise InputError(f"{name} has the same name twice: {value!r}")
+    return list(names)
+
+
+def checked_lines(name: str, value: Any) -> None:
+    """Refuse what is no lines of text."""
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        raise InputError(f"{name} must be lines of text, got {value!r}")
+    for line in value:
+        if not isinstance(line, str):
+            raise InputError(f"{name} must be lines of text, got {line!r} among them")
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Options:
-    """Options of a file, as `Joint.export` describes them; None where one is not given."""
+    """Options of every file of a law; a format that has more declares them in a class of its own."""
 
-    pressures: Any = None
-    name: str | None = None
-    heat: bool | None = None
-    friction_pressure: float | str | None = None
-    quantity: str | Sequence[str] | None = None
-    rows: int | None = None
-    rtol: float | None = None
-    length_unit: str | None = None
-    stress_unit: str | None = None
-    leakage: bool | None = None
-    direction: str | float | None = None
-    peklenik: float | None = None
-    binaries: str | None = None
-    made_by: Sequence[str] = ()
+    name: Any = field(
+        default=None,
+        metadata=option(
+            "Of the interaction, table, functions or module; else in the comments."
+        ),
+    )
+    heat: Any = field(
+        default=None, metadata=option("Leave conductance out.", "off", require_flag)
+    )
+    length_unit: Any = field(
+        default=None, metadata=option("Of the file; of a joint mm by default.")
+    )
+    stress_unit: Any = field(
+        default=None, metadata=option("Of the file; of a joint MPa by default.")
+    )
+    made_by: Any = field(
+        default=None,
+        metadata=option(
+            "Lines of the header on how the file was made.", "", checked_lines
+        ),
+    )
 
-    def of_some_targets(self) -> dict[str, Any]:
-        """Those given that some targets take and others refuse, by name."""
-        names = ("rows", "rtol", "leakage", "direction", "peklenik", "binaries")
-        given = {name: getattr(self, name) for name in names}
-        return {name: value for name, value in given.items() if value is not None}
+    @classmethod
+    def names(cls) -> dict[str, dataclasses.Field[Any]]:
+        """Declarations by name, those of every file first."""
+        return {each.name: each for each in dataclasses.fields(cls)}
+
+    def __post_init__(self) -> None:
+        for name, declared in self.names().items():
+            value = getattr(self, name)
+            check = declared.metadata["check"]
+            if value is not None and check is not None:
+                check(name, value)
+
+    def given(self) -> dict[str, Any]:
+        """Those that were given, of the format itself."""
+        more = [name for name in self.names() if name not in Options.names()]
+        values = {name: getattr(self, name) for name in more}
+        return {name: value for name, value in values.items() if value is not None}
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class QuantityOptions(Options):
+    """Options of formats that have further quantities: laws as code, FMUs and rows."""
+
+    quantity: Any = field(
+        default=None,
+        metadata=option(
+            "Of the rows, any that contacts have, else the usual one; several for some "
+            "programs. Of laws as code further functions.",
+            "names",
+            checked_names,
+        ),
+    )
+    leakage: Any = field(
+        default=None,
+        metadata=option(
+            "Flow coefficient of the gaps: rows of it alone, laws as code with it.",
+            "flag",
+            require_flag,
+        ),
+    )
+    direction: Any = field(
+        default=None,
+        metadata=option(
+            "Of leakage of a map, x, y or degrees; else the mean of both axes."
+        ),
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RowOptions(QuantityOptions):
+    """Options of rows; a format takes those that its quantities need."""
+
+    pressures: Any = field(
+        default=None,
+        metadata=option(
+            "Smallest and largest pressure: where the error holds, and the rows end.",
+            "range",
+        ),
+    )
+    rows: Any = field(
+        default=None,
+        metadata=option("Number of rows; else as few as --rtol needs.", "whole"),
+    )
+    rtol: Any = field(
+        default=None,
+        metadata=option(
+            "Largest relative error of linear interpolation; 1e-3 by default.", "number"
+        ),
+    )
+    friction_pressure: Any = field(
+        default=None,
+        metadata=option(
+            "At which a friction card's stiffness holds; else amid --pressures.",
+            "quantity",
+        ),
+    )
+    peklenik: Any = field(
+        default=None,
+        metadata=option(
+            "Of a film: length of the roughness along x over that along y.", "number"
+        ),
+    )
+
+
+def names_of(options: type[Options]) -> set[str]:
+    """Names of the options that a format has beside those of every file."""
+    return options.names().keys() - Options.names().keys()
+
+
+ROWS = LAW | (names_of(RowOptions) - FRICTION)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -103,7 +241,8 @@ class Target:
     # False. Text or bytes, or several files by how their names end after that of the first,
     # whose own end is ""
     write: Callable[..., Any]
-    takes: frozenset[str] = ROWS  # options of the command
+    takes: frozenset[str] = ROWS  # options of the format, and those of a law
+    options: type[Options] = RowOptions  # their declarations
     rows: bool = True
     # of the first file's name, where it must be that; functions are then called by the rest
     # of it
@@ -128,6 +267,29 @@ class Target:
     longest_name: int | None = None  # letters of a name, where one stands in the file
     # curves that the first file of rows has
     read: Callable[[bytes], list[Curve]] | None = None
+
+    def given_options(self, given: Mapping[str, Any]) -> Options:
+        """The options of a file, checked.
+
+        Raises
+        ------
+        InputError
+            For options that the target does not have, and values of a wrong type.
+        """
+        declared = self.options.names()
+        values = {}
+        for name, value in given.items():
+            is_flag = name in declared and declared[name].metadata["kind"] == "flag"
+            is_off = is_flag and isinstance(value, bool | np.bool_) and not value
+            if value is not None and not is_off:
+                values[name] = value
+        allowed = self.takes & names_of(self.options) | Options.names().keys()
+        unused = [name for name in values if name not in allowed]
+        if unused:
+            raise InputError(
+                f"without effect on {self.name}: leave {' and '.join(unused)} out"
+            )
+        return self.options(**values)
 
     def takes_rows(self, name: str) -> bool:
         """Whether the program takes rows of a quantity."""

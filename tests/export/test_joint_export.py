@@ -11,6 +11,7 @@ import subprocess
 import types
 import zipfile
 
+import click
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -21,7 +22,8 @@ from test_programs import TOP, calculix, conductance, each, heated
 
 from mbma_tables import Bodies, InputError, Joint, contact
 from mbma_tables.cli import main
-from mbma_tables.export.registry import targets
+from mbma_tables.export import registry
+from mbma_tables.export.registry import declared_options, targets
 from mbma_tables.export.text import number, template
 
 FACE = {"Rq": "0.4 um", "hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
@@ -678,9 +680,16 @@ def test_both_commands_take_the_same_options_of_files(tmp_path):
     assert done.exit_code == 0, done.output
     assert "rough_pressure[] =" in done.output
     assert "rough_leakage[] =" in done.output
-    commands = [main.commands["export"], main.commands["joint"]]
-    shared = [{each.name: each.help for each in one.params} for one in commands]
-    names = shared[0].keys() & shared[1].keys() - {"out", "help"}
+    shared = []
+    for name in ("export", "joint"):
+        command = main.commands[name]
+        parameters = command.get_params(click.Context(command))
+        shared.append({each.name: getattr(each, "help", "") for each in parameters})
+    declared = declared_options(*registry.OF_LAWS)
+    for name, option in declared.items():
+        if name not in ("length_unit", "stress_unit", "made_by"):
+            assert {one[name] for one in shared} == {option.metadata["help"]}
+    names = declared.keys() & shared[0].keys()
     assert {"pressures", "rows", "quantity", "binaries"} <= names
     file_options = {
         "pressures", "name", "quantity", "rows", "rtol", "friction_pressure", "leakage",

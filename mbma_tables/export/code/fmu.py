@@ -1,6 +1,7 @@
 """A contact law as a Functional Mock-up Unit, FMI 2.0 or 3.0, model exchange and co-simulation: C and binaries."""
 
 import contextlib
+import dataclasses
 import functools
 import importlib.util
 import io
@@ -11,6 +12,7 @@ import sys
 import uuid
 import zipfile
 from collections.abc import Mapping
+from dataclasses import field
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -19,11 +21,11 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import factor
 from mbma_tables.contacts.quantities import registry
 from mbma_tables.export.code.language import AskedLaw
-from mbma_tables.export.code.law_code import MAX_NAME, asked_law, text_of
+from mbma_tables.export.code.law_code import CODE, MAX_NAME, asked_law, text_of
 from mbma_tables.export.exported_law import ExportedLaw
 from mbma_tables.export.model.c_code import BuildError, built_by
 from mbma_tables.export.reserved_words import windows_words
-from mbma_tables.export.targets import CODE, Target
+from mbma_tables.export.targets import QuantityOptions, Target, option
 from mbma_tables.export.text import checked_name, filled, inert, number
 from mbma_tables.surfaces.any_surface import AnySurface
 
@@ -54,7 +56,20 @@ MACHINES = {
     "amd64 win32": "x86_64-windows",
     "arm64 win32": "aarch64-windows",
 }
+BINARIES = ("here", "all", "none")
 INPUT = 1  # value reference of overclosure, after time
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class FmuOptions(QuantityOptions):
+    """Options of an FMU."""
+
+    binaries: Any = field(
+        default=None,
+        metadata=option(
+            "In an FMU: for this platform, for all by zig, or none.", "|".join(BINARIES)
+        ),
+    )
 
 
 def fmu(
@@ -158,10 +173,8 @@ def _binaries(
     name: str, source: str, asked: str, platforms: Mapping[str, tuple[str, str]]
 ) -> dict[str, bytes]:
     """Shared libraries by their paths in the file, for the platforms asked for, as far as there is a compiler."""
-    if asked not in ("here", "all", "none"):
-        raise InputError(
-            f"binaries must be one of {('here', 'all', 'none')}, got {asked!r}"
-        )
+    if asked not in BINARIES:
+        raise InputError(f"binaries must be one of {BINARIES}, got {asked!r}")
     zig = importlib.util.find_spec("ziglang")
     system = f"{platform.machine()} {sys.platform}".lower()
     if asked == "all" and zig is None:
@@ -356,6 +369,7 @@ TARGETS = (
         "fmu",
         fmu,
         CODE | {"binaries"},
+        FmuOptions,
         rows=False,
         output=(
             "an FMU of FMI 2.0, for model exchange and co-simulation: the C law, "
@@ -372,6 +386,7 @@ TARGETS = (
         "fmu3",
         functools.partial(fmu, fmi=3),
         CODE | {"binaries"},
+        FmuOptions,
         rows=False,
         output=(
             "the same of FMI 3.0; with `--binaries all` also for Linux, macOS and "

@@ -37,12 +37,20 @@ from mbma_tables.export.exported_law import (
     exported_law,
     with_conductivity,
 )
-from mbma_tables.export.targets import CODE, Target, require_quantity
+from mbma_tables.export.targets import (
+    LAW,
+    QuantityOptions,
+    Target,
+    names_of,
+    require_quantity,
+)
 from mbma_tables.export.text import about, checked_name, filled, inert, number, opening
 from mbma_tables.surfaces.any_surface import AnySurface
 
 # where none is given
 NAME = "law"
+# options of a law as code
+CODE = LAW | names_of(QuantityOptions) | {"name"}
 # letters, as Fortran and C99 read them
 MAX_NAME = 31
 
@@ -388,13 +396,16 @@ def _call(language: Language, what: str, x: float, y: float) -> str:
 
 
 def _target(name: str, language: Language) -> Target:
-    takes = CODE - {"leakage", "quantity"} if language.subroutine else CODE
+    takes = CODE
+    if language.subroutine:
+        takes = CODE - names_of(QuantityOptions)
     if language.friction is not None:
         takes |= {"friction"}
     return Target(
         name,
         functools.partial(law_files, name),
         takes,
+        QuantityOptions,
         rows=False,
         alone=language.alone,
         beside=tuple(file.end for file in language.beside),

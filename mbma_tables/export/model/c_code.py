@@ -14,6 +14,7 @@ import subprocess
 import tempfile
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +31,7 @@ from mbma_tables.export.model.conformance import (
     lookup_kind,
     points_text,
 )
-from mbma_tables.export.targets import Target
+from mbma_tables.export.targets import Options, Target, names_of, option
 from mbma_tables.export.text import (
     about,
     braces,
@@ -545,11 +546,31 @@ def read_report(text: str) -> Replay:
     )
 
 
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ModelOptions(Options):
+    """Options of the whole model."""
+
+    table: Any = field(
+        default=None,
+        metadata=option(
+            "Of the whole model: FILE.nc of a table, or island4d, in place of the shipped "
+            "universal one."
+        ),
+    )
+    check: Any = field(
+        default=None,
+        metadata=option(
+            "Of the whole model: build it and replay its conformance points.", "flag"
+        ),
+    )
+
+
 TARGETS = (
     Target(
         "c",
         write_code,
-        frozenset({"variant", "table", "check"}),
+        frozenset({"variant"} | names_of(ModelOptions)),
+        ModelOptions,
         output=(
             "the whole model, C11: the table, island geometry, totals, the closed "
             "forms; the calibrated law and Persson's theory"
