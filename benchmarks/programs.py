@@ -42,7 +42,7 @@ from mbma_tables.export.model.c_code import SOURCES, write_code
 from mbma_tables.export.registry import targets
 from mbma_tables.export.request import export_law, files_of
 from mbma_tables.export.rows.data import from_json
-from mbma_tables.export.targets import Options, Target
+from mbma_tables.export.targets import Target
 from mbma_tables.theories import Mbma
 
 # of units, in metres and pascals
@@ -286,7 +286,7 @@ def in_rows(one: Case, target: Target, law: LawTable) -> Found | None:
     if law.x.size > target.most.get(law.quantity, law.x.size):
         return None
     out = pathlib.Path(f"law{target.end or '.txt'}")
-    content = files_of([law], target.name, Options(), out).files[""]
+    content = files_of([law], target.name, {}, out).files[""]
     assert target.read is not None
     found = NOTHING
     curves = target.read(content)

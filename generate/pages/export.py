@@ -68,8 +68,8 @@ def _takers(option: str) -> Iterable[str]:
     """Targets that have an option, by what they write."""
     of_all = option in Options.names()
     for label, groups in KINDS.items():
-        takers = []
-        others = []
+        takers: list[str] = []
+        others: list[str] = []
         for name, target in targets(*groups).items():
             taken = of_all or option in target.takes & names_of(target.options)
             (takers if taken else others).append(f"`{name}`")
