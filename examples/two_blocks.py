@@ -120,7 +120,10 @@ def compared() -> list[tuple[str, float, float]]:
         friction=FRICTION,
     )
     card = joint.export(
-        "calculix", ("1 MPa", "50 MPa"), "JOINT", friction_pressure=f"{PRESSURE} MPa"
+        "calculix",
+        ("1 MPa", "50 MPa"),
+        name="JOINT",
+        friction_pressure=f"{PRESSURE} MPa",
     )
     faces, displacements, shears = expected(joint)
     closure = (
