@@ -1,22 +1,22 @@
 """`python -m generate adhesion`: contacts with an attraction by boundary elements, and what the theory answers.
 
-Rows are written as they are found; called again, it goes on where it was. Heights have an
-rms gradient of one and E* is one, so that pressures are over E* g; lengths are in h_rms.
+Each surface and attraction has a file of its own, and called again it goes on where it was.
+Heights have an rms gradient of one and E* is one, so that pressures are over E* g; lengths are in h_rms.
 """
 
-import csv
+import dataclasses
 import itertools
 import pathlib
-from collections.abc import Iterator
-from typing import Any
+from typing import Any, cast
 
 import click
 import numpy as np
 import pandas as pd
 
 from generate import files
+from generate.boundary_elements import run as campaigns
 from generate.boundary_elements.solve import load_at, prepared
-from generate.boundary_elements.surfaces import Recipe, heights
+from generate.boundary_elements.surfaces import Recipe, Task, heights
 from mbma_tables import Adhesion, Bodies, Surface, contact
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, MbmaError
@@ -55,55 +55,93 @@ COLUMNS = (
 )
 
 
-def solved(row: tuple[Any, ...], known: set[tuple[float, ...]]) -> Iterator[list[Any]]:
-    """Contacts of one surface that are not known yet."""
-    hurst, zeta_1, waves, seed, fitted = row
-    recipe = Recipe("self_affine", hurst, zeta_1, waves, seed, POINTS)
-    surface, _, _ = prepared(heights(recipe), recipe.sizes, recipe.q0)
-    h_rms = float(surface.std())
-    face = Surface.from_map(surface, dx=1 / POINTS, periodic=True)
-    for length, number in itertools.product(RANGES, TABOR):
-        if (seed, length, number) in known:
-            continue
-        rho = length * h_rms
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """A surface and an attraction."""
+
+    surface: Recipe
+    fitted: bool  # whether a constant may see it
+    range: float  # over h_rms
+    tabor: float
+
+    @property
+    def name(self) -> str:
+        return f"{self.surface.name}_r{self.range:g}_t{self.tabor:g}"
+
+    def map(self) -> FloatArray:
+        """Heights at rms gradient 1, of unit sides."""
+        recipe = self.surface
+        values, _, _ = prepared(heights(recipe), recipe.sizes, recipe.q0)
+        return np.asarray(values)
+
+    def lengths(self, surface: FloatArray) -> tuple[float, float]:
+        """Work over E* and range."""
+        face = Surface.from_map(surface, dx=1 / len(surface), periodic=True)
+        rho = self.range * float(surface.std())
         curvature = np.sqrt(theory.LAPLACIAN * float(face.m4))
-        work = float(np.sqrt(number**3 * curvature * rho**3 / 2))
-        yield from _contacts(
-            (*row[:4], int(fitted), length, number, work / h_rms),
-            face,
-            surface,
-            work,
-            rho,
+        return float(np.sqrt(self.tabor**3 * curvature * rho**3 / 2)), rho
+
+
+def cases() -> list[Case]:
+    """Every case of the campaign."""
+    return [
+        Case(
+            Recipe("self_affine", hurst, zeta_1, waves, seed, POINTS),
+            fitted,
+            length,
+            number,
         )
+        for hurst, zeta_1, waves, seed, fitted in SURFACES
+        for length, number in itertools.product(RANGES, TABOR)
+    ]
 
 
-def _contacts(
-    node: tuple[Any, ...], face: Any, surface: FloatArray, work: float, rho: float
-) -> Iterator[list[Any]]:
+def described(case: Case) -> dict[str, Any]:
+    """Columns of a case."""
+    own = case.surface
+    return {
+        "hurst": own.hurst,
+        "zeta_1": own.zeta_1,
+        "waves": own.waves,
+        "seed": own.seed,
+        "fitted": int(case.fitted),
+        "range": case.range,
+        "tabor": case.tabor,
+    }
+
+
+def solved(case: Any) -> dict[str, FloatArray]:
+    """Contacts of a case from the heaviest load on; NaN where the attraction does not settle."""
+    surface = case.map()
+    face = Surface.from_map(surface, dx=1 / len(surface), periodic=True)
     h_rms = float(surface.std())
+    work, rho = case.lengths(surface)
     engine = AdhesiveContact(
         surface, (1.0, 1.0), lambda gap: work / rho * np.exp(-gap / rho), TOLERANCE
     )
+    rows = []
     for share in reversed(AREAS):
         load = load_at(share, np.inf)
-        try:
-            found = engine.press(load)
-        except ConvergenceError:
-            yield [*node, load, *[np.nan] * 8]
-            continue
-        elastic = [np.nan, np.nan]
-        if found["net_pressure"] > 0:
-            free = contact(face, pressure=found["net_pressure"], theory="simulated")
-            elastic = [float(free.area), float(free.mean_separation) / h_rms]
-        yield [
-            *node,
-            load,
-            found["net_pressure"],
-            *(found[name] for name in ("area", "area_raw", "area_compressed")),
-            found["mean_separation"] / h_rms,
-            *elastic,
-            found["renewals"],
-        ]
+        row = {"work": work / h_rms, "contact_pressure": load}
+        rows.append(row | _answers(engine, load, face, h_rms))
+    names = COLUMNS[COLUMNS.index("work") :]
+    return {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
+
+
+def _answers(
+    engine: AdhesiveContact, load: float, face: Any, h_rms: float
+) -> dict[str, float]:
+    """What is found at a load, and without attraction at the same net pressure."""
+    try:
+        found = dict(engine.press(load))
+    except ConvergenceError:
+        return {}
+    found["mean_separation"] /= h_rms
+    if found["net_pressure"] > 0:
+        free = contact(face, pressure=found["net_pressure"], theory="simulated")
+        found["elastic_area"] = float(free.area)
+        found["elastic_separation"] = float(free.mean_separation) / h_rms
+    return found
 
 
 def answered(rows: pd.DataFrame, name: str, share: float) -> pd.DataFrame:
@@ -165,33 +203,28 @@ def _answer(row: Any, name: str) -> list[Any]:
 
 @click.command()
 @click.option(
+    "--folder",
+    type=click.Path(path_type=pathlib.Path),
+    default="adhesion",
+    show_default=True,
+    help="One file a surface and attraction.",
+)
+@click.option(
     "--data", type=click.Path(path_type=pathlib.Path), default=FILE, show_default=True
 )
 @click.option("--compare", is_flag=True, help="Print errors of the theory, no runs.")
-def adhesion(data: pathlib.Path, compare: bool) -> None:
-    """Solve contacts with an attraction, half an hour on one core; `--compare` with the theory."""
+def adhesion(folder: pathlib.Path, data: pathlib.Path, compare: bool) -> None:
+    """Solve contacts with an attraction, half an hour on one core; `--compare` with the theory.
+
+    Stopped and called again, it goes on where it was.
+    """
     if compare:
         _compare(pd.read_csv(data, comment="#"))
         return
-    known: set[tuple[float, ...]] = set()
-    if data.exists():
-        rows = pd.read_csv(data, comment="#")
-        counts = rows.groupby(["seed", "range", "tabor"]).size()
-        known = {key for key, count in counts.items() if count == len(AREAS)}
-        whole = [
-            key in known for key in zip(rows.seed, rows.range, rows.tabor, strict=True)
-        ]
-        rows = rows[whole]
-    else:
-        rows = pd.DataFrame(columns=list(COLUMNS))
-    text = rows.to_csv(index=False, lineterminator="\n", float_format="%.8g")
-    write_file(data, (HEAD + text).encode())
-    with data.open("a", encoding="utf-8", newline="") as opened:
-        writer = csv.writer(opened, lineterminator="\n")
-        for surface in SURFACES:
-            for row in solved(surface, known):
-                writer.writerow([f"{value:.8g}" for value in row])
-                opened.flush()
+    asked = cases()
+    campaigns.run([Task(cast(Recipe, case), "") for case in asked], folder, 1, solved)
+    frame = campaigns.gathered(folder, asked, described)
+    write_file(data, files.to_csv(HEAD, frame[list(COLUMNS)], "%.8g"))
 
 
 def under_compression(rows: pd.DataFrame) -> pd.Series:

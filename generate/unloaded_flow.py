@@ -110,17 +110,6 @@ def solved(case: Any) -> dict[str, FloatArray]:
     return {name: values[:, k] for k, name in enumerate(COLUMNS)}
 
 
-def gathered(folder: pathlib.Path) -> pd.DataFrame:
-    """Rows of the surfaces that are solved."""
-    frames = []
-    for case in cases():
-        path = folder / f"{case.name}.npz"
-        if path.exists():
-            with np.load(path, allow_pickle=False) as content:
-                frames.append(pd.DataFrame(dict(content)))
-    return pd.concat(frames, ignore_index=True)[list(COLUMNS)]
-
-
 def openings(rows: pd.DataFrame) -> pd.DataFrame:
     """Growth of the simulated hydraulic aperture over that of the mean gap, at each lower load."""
     data = rows.assign(aperture=np.cbrt(np.sqrt(rows.flow_x * rows.flow_y)))
@@ -212,7 +201,7 @@ def unloaded_flow(
         campaigns.run(tasks, folder, 1, solved)
         return
     if collect:
-        rows = gathered(folder)
+        rows = campaigns.gathered(folder, cases())[list(COLUMNS)]
         write_file(path, files.to_csv("", rows, "%.6g"))
         progress.echo(f"{path}: {len(rows)} contacts")
         return

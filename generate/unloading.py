@@ -11,7 +11,6 @@ from typing import Any, cast
 
 import click
 import numpy as np
-import pandas as pd
 
 from generate.boundary_elements import run as campaigns
 from generate.boundary_elements.solve import load_at
@@ -185,19 +184,6 @@ def described(group: Group) -> dict[str, Any]:
     return own | {"points": surface.points, "psi": group.psi}
 
 
-def gathered(folder: pathlib.Path, asked: list[Group]) -> pd.DataFrame:
-    """Rows of those groups that are solved."""
-    frames = []
-    for group in asked:
-        path = folder / f"{group.name}.npz"
-        if path.exists():
-            with np.load(path, allow_pickle=False) as content:
-                frame = pd.DataFrame(dict(content))
-            own = described(group)
-            frames.append(frame.assign(**own)[[*own, *frame.columns]])
-    return pd.concat(frames, ignore_index=True)
-
-
 @click.command()
 @click.option(
     "--folder",
@@ -228,7 +214,7 @@ def unloading(folder: pathlib.Path, collect: bool, fit: bool, out: pathlib.Path)
     for path, asked in ((out, groups()), (CELLS, repeats())):
         if not any((folder / f"{group.name}.npz").exists() for group in asked):
             continue
-        frame = gathered(folder, asked)
+        frame = campaigns.gathered(folder, asked, described)
         write_file(path, gzip.compress(to_csv(HEAD, frame, "%.6g"), mtime=0))
         click.echo(f"{path}: {len(frame)} contacts")
 

@@ -10,7 +10,7 @@ import itertools
 import pathlib
 import time
 import tomllib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import click
@@ -121,6 +121,23 @@ def run(
         raise RuntimeError(
             f"{len(failures)} of {len(missing)} surfaces failed: {failures[0]}"
         )
+
+
+def gathered(
+    folder: pathlib.Path,
+    asked: Sequence[Any],
+    described: Callable[[Any], dict[str, Any]] = lambda one: {},
+) -> pd.DataFrame:
+    """Rows of those of the asked that are solved, behind the columns that describe each."""
+    frames = []
+    for one in asked:
+        path = folder / f"{one.name}.npz"
+        if path.exists():
+            with np.load(path, allow_pickle=False) as content:
+                frame = pd.DataFrame(dict(content))
+            own = described(one)
+            frames.append(frame.assign(**own)[[*own, *frame.columns]])
+    return pd.concat(frames, ignore_index=True)
 
 
 def collected(name: str, found: Sequence[dict[str, Any]], kind: str) -> xr.Variable:
