@@ -39,6 +39,11 @@ REPLICAS = 20  # whose standard deviation is known to 16%
 # longest wavelengths that the traces hold together: with 64 of them 78% of the errors lay
 # within two standard deviations, with 96 and more 90 to 100% (`python -m generate profiles`)
 MIN_WAVES = 100.0
+# bands of wavenumbers, q (1 - b) to q (1 + b), of which no isotropic surface has much of its
+# power in a trace; of so many components at least, and beyond so many standard deviations
+BANDS = (0.02, 0.05, 0.1)
+IN_BAND = 8
+BEYOND = 3.0
 ISOTROPIC = "the surface is isotropic: traces in one direction do not show a lay"
 ONE_DIRECTION = (
     "isotropy is assumed, and traces in one direction do not show a lay: "
@@ -254,8 +259,36 @@ def _directions(directions: Sequence[_Traces], isotropic: bool) -> list[dict[str
         description = f"gradients along and across differ by a factor of {ratio:.3g}"
         return [{"step": "directions", "anisotropy": ratio, "told": description}]
     if isotropic:
-        return [{"step": "directions", "assumed": [ISOTROPIC]}]
+        return [{"step": "directions", "assumed": [ISOTROPIC]}, *_lay(directions[0])]
     return [{"step": "directions", "not_valid": ONE_DIRECTION}]
+
+
+def _lay(traces: _Traces) -> list[dict[str, Any]]:
+    """Note on more power at one wavelength than traces of an isotropic surface can have.
+
+    A trace crosses waves at all angles: of waves of one length, the share 1 - (2/pi)
+    asin(q/q') appears at wavenumbers from q to their own q', and less of all other spectra.
+    """
+    powers = np.append(0.0, np.cumsum(traces.C * traces.width))
+    overlap = float(traces.overlap.max())
+    for band in BANDS:
+        first = np.searchsorted(traces.q, traces.q * (1 - band))
+        end = np.searchsorted(traces.q, traces.q * (1 + band), side="right")
+        count = (end - first) / overlap
+        share = (powers[end] - powers[first]) / powers[-1]
+        of_ring = 1 - 2 / math.pi * math.asin((1 - band) / (1 + band))
+        most = of_ring * (1 + BEYOND / np.sqrt(count))
+        excess = np.where(end - first >= IN_BAND, share / most, 0.0)
+        peak = int(excess.argmax())
+        if excess[peak] > 1:
+            why = (
+                f"{share[peak]:.0%} of the traces' height variance lies within {band:.0%} of "
+                f"one wavenumber, of an isotropic surface {of_ring:.0%} at most: the "
+                "surface has a lay, as turned ones have, and "
+                "Surface.from_profile(..., across=[...]) takes traces at right angles"
+            )
+            return [{"step": "lay", "share": float(share[peak]), "not_valid": why}]
+    return []
 
 
 def _anisotropy(directions: Sequence[_Traces]) -> float | None:

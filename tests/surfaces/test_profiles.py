@@ -289,6 +289,21 @@ class TestSeveral:
         assert not any("isotropy is assumed" in doubt for doubt in stated.doubts)
         assert any("the surface is isotropic" in each for each in assumptions(stated))
 
+    def test_a_trace_across_a_lay_contradicts_isotropy(self):
+        place = np.arange(POINTS)
+        grooves = 3 * np.abs(np.sin(np.pi * place / 60))
+        rough = 0.1 * rough_line() / np.std(rough_line())
+        turned = Surface.from_profile(grooves + rough, 1.0, isotropic=True)
+        assert any("the surface has a lay" in doubt for doubt in turned.doubts)
+        # waves of one length in all directions are the nearest to it that is isotropic
+        rings = [
+            trace(plateau(0.6, q, q), q, seed, waves=300)
+            for seed, q in enumerate((0.98 * SHORTEST, 0.9 * SHORTEST))
+        ]
+        for line in (*rings, rough_line()):
+            found = Surface.from_profile(line, 1.0, isotropic=True)
+            assert not any("the surface has a lay" in doubt for doubt in found.doubts)
+
     def test_long_traces_of_a_tested_kind_are_valid(self):
         lines = [0.005 * rough_line(seed) for seed in range(4)]
         found = Surface.from_profile(lines, 1.0, isotropic=True)
