@@ -20,6 +20,7 @@ from mbma_tables.contacts.quantities import registry
 from mbma_tables.contacts.quantities.interface import Interface
 from mbma_tables.contacts.question import GAPS
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.banded import BandedSurface
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.maps import extrapolated
 from mbma_tables.surfaces.self_affine import PARAMETERS
@@ -158,6 +159,9 @@ def unknowns_of(
             "derivatives of a batch of spectra are by numbers of drawings or of joints, of "
             "which this one was not made: take one surface at a time"
         )
+    if isinstance(surface, BandedSurface):
+        # of a sum of power laws nothing else is known
+        surface = surface.sampled()
     moved: Any = surface if unit in (None, surface.unit) else surface.to(unit or "")
     if isinstance(moved, Surface):
         own = {name: getattr(moved, name) for name in PARAMETERS}

@@ -30,6 +30,7 @@ from mbma_tables.effects.rough_contact import pressed
 from mbma_tables.export.text import about, bound, number
 from mbma_tables.islands.variants import Variant
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.banded import BandedSurface
 from mbma_tables.surfaces.surface import MeasuredSurface
 from mbma_tables.theories import resolve
 from mbma_tables.theories.base import Theory, UserTheory
@@ -362,8 +363,13 @@ class ExportedLaw:
     def _hashes(self) -> Iterator[str]:
         """Lines on the table that the theory uses, and on a surface not given by five numbers."""
         yield from self.theory.provenance()
-        if isinstance(self.surface, MeasuredSurface):
-            values = hashlib.sha256(np.stack([self.surface.q, self.surface.C]).tobytes())
+        samples = None
+        if isinstance(self.surface, BandedSurface):
+            samples = self.surface.sampled()
+        elif isinstance(self.surface, MeasuredSurface):
+            samples = self.surface
+        if samples is not None:
+            values = hashlib.sha256(np.stack([samples.q, samples.C]).tobytes())
             yield f"spectrum: values {values.hexdigest()[:16]}"
 
     def _spread(self, what: str, scatter: Numbers, pressure: FloatArray) -> str:

@@ -58,6 +58,7 @@ class AnySurface(Displayed, abc.ABC):
     ] = ()  # names of the numbers that define it; empty if a spectrum does
 
     banded: ClassVar[Any]  # `BandedSurface`
+    spectral: ClassVar[Any]  # `MeasuredSurface`
 
     # fields in one class, properties in the other; `MEANINGS` describes them
     q0: Any
@@ -247,11 +248,27 @@ class AnySurface(Displayed, abc.ABC):
         """The sum with a surface in the same unit where it is one power law; None where it is not."""
         return None
 
+    @property
+    def is_sum_of_laws(self) -> bool:
+        """Whether the spectrum is a sum of a few power laws, and was not measured."""
+        return bool(self.bands_if_few()) and not self.resolution
+
+    def _sum_with(self, other: AnySurface) -> Any:
+        """The sum with a surface in the same unit: of power laws exact, of measured spectra in samples."""
+        pair = self, other
+        is_batch = any(each.labelled or each.shape != () for each in pair)
+        bands = sum(len(each.bands_if_few()) for each in pair)
+        if is_batch or (
+            all(each.is_sum_of_laws for each in pair) and bands <= spectrum.MOST_BANDS
+        ):
+            return self._bands_with(other)
+        return self.sampled().added(other.sampled())
+
     def _bands_with(self, other: AnySurface) -> Any:
-        """The sum with a surface in the same unit, of which at least one is a batch."""
+        """The sum with a surface in the same unit of power laws, each."""
         bands = [*self.bands_if_few(), *other.bands_if_few()]
         for one in (self, other):
-            if not one.bands_if_few() or one.resolution:
+            if not one.is_sum_of_laws:
                 raise InputError(
                     "a measured surface and a batch are not added, as a spectrum of many samples is "
                     "known of one surface at a time: combine each entry of the batch with it"
@@ -284,10 +301,10 @@ class AnySurface(Displayed, abc.ABC):
         -------
         Surface, MeasuredSurface or BandedSurface
             In the unit of the first. Of two self-affine surfaces with the same q0, q1 and
-            Hurst exponent a `Surface`; of all others a `MeasuredSurface`, or of arrays a
-            `BandedSurface` of the broadcast shape. Its h_max is exceeded by as small a
-            share of heights as those of both: for Gaussian surfaces the root of the sum of
-            squares.
+            Hurst exponent a `Surface`; of others a `BandedSurface` of the broadcast
+            shape, or a `MeasuredSurface` where one was measured. Its h_max is exceeded by
+            as small a share of heights as those of both: for Gaussian surfaces the root of
+            the sum of squares.
 
         Raises
         ------
@@ -313,10 +330,8 @@ class AnySurface(Displayed, abc.ABC):
         """
         other = other.in_unit_of(self)
         both = self.power_law_with(other)
-        if both is None and any(s.labelled or s.shape != () for s in (self, other)):
-            both = self._bands_with(other)
-        elif both is None:
-            both = self.sampled().added(other.sampled())
+        if both is None:
+            both = self._sum_with(other)
         return (
             both
             if nominal_area is None

@@ -1,7 +1,6 @@
-"""Batches of surfaces whose spectra are sums of power laws: two parts in contact, a roll-off, a gap.
+"""Surfaces whose spectra are sums of power laws: two parts in contact, a roll-off, a gap.
 
-One surface of this kind is a `MeasuredSurface` of samples; a batch of them has a row of numbers
-for each power law, as a batch of self-affine surfaces has for its one.
+They have a row of numbers for each power law, as self-affine surfaces have for their one.
 """
 
 from __future__ import annotations
@@ -30,11 +29,17 @@ from mbma_tables.common.units import Units
 from mbma_tables.surfaces.any_surface import AnySurface, apply, frozen, refuse_plain
 from mbma_tables.surfaces.heights import of_area
 from mbma_tables.surfaces.spectral import WIDEST, SpectralSurface
-from mbma_tables.surfaces.spectrum import MAX_ZETA_1, MIN_ZETA_1, SHARES, Band, growth
+from mbma_tables.surfaces.spectrum import (
+    MAX_ZETA_1,
+    MIN_ZETA_1,
+    MOST_BANDS,
+    SHARES,
+    Band,
+    growth,
+)
 
 # wavenumbers at which the longest waves are looked for, besides the ends of bands
 SCAN = 48
-MOST = 16  # bands that the core adds
 SAME = 1e-12  # relative difference of numbers that differ by rounding
 MOMENTS = ("m0", "m2", "m4")
 DERIVED = ("q0", "q1", *MOMENTS)
@@ -89,10 +94,10 @@ def _longest(*numbers: Any) -> tuple[FloatArray]:
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class BandedSurface(AnySurface):
-    """A batch of surfaces whose spectra are sums of power laws, of Gaussian heights.
+    """A surface whose spectrum is a sum of power laws, or a batch of them, of Gaussian heights.
 
-    `Surface.from_roughness` with arrays and a roll-off makes one, and `combined` of batches
-    that differ in their wavelengths or Hurst exponents.
+    `Surface.from_roughness` with arrays and a roll-off makes one, and `combined` of surfaces
+    that differ in their wavelengths or Hurst exponents. `sampled` has one as samples q, C.
 
     Parameters
     ----------
@@ -131,12 +136,13 @@ class BandedSurface(AnySurface):
     nominal_area: dataclasses.InitVar[Any] = None
 
     hurst = None
+    anisotropy = None
 
     def __post_init__(self, nominal_area: Any) -> None:
         vars(self).update(unit=Units(self.unit).length)
         bands = tuple(Band(*band) for band in self.bands)
-        if not 0 < len(bands) <= MOST:
-            raise InputError(f"a spectrum has 1 to {MOST} bands, got {len(bands)}")
+        if not 0 < len(bands) <= MOST_BANDS:
+            raise InputError(f"a spectrum has 1 to {MOST_BANDS} bands, got {len(bands)}")
         vars(self).update(bands=bands)
         if nominal_area is not None:
             like = dataclasses.replace(self, h_max=1.0, nominal_area=None)
@@ -276,14 +282,18 @@ class BandedSurface(AnySurface):
             total = total + np.where(inside, C, 0.0)
         return total[()]
 
-    def sampled(self) -> SpectralSurface:
-        """The same surface given by samples of its spectrum; not for a batch."""
+    def sampled(self) -> Any:
+        """The same surface, a `MeasuredSurface` of samples of its spectrum; not for a batch."""
         if self.labelled or self.shape != ():
             raise InputError("a batch has no single spectrum: take one surface at a time")
         return self.entry(())
 
-    def entry(self, index: tuple[int, ...]) -> SpectralSurface:
-        """One surface of the batch, given by samples of its spectrum."""
+    def fit(self, band: tuple[float, float] | None = None) -> Any:
+        """The self-affine surface nearest to it, as `MeasuredSurface.fit`; not for a batch."""
+        return self.sampled().fit(band)
+
+    def entry(self, index: tuple[int, ...]) -> Any:
+        """One surface of the batch, a `MeasuredSurface` of samples of its spectrum."""
         parts = []
         for band in self.bands:
             low, high, C, power = (float(np.asarray(each)[index]) for each in band)
@@ -291,13 +301,14 @@ class BandedSurface(AnySurface):
                 ends = [C, C * (high / low) ** power]
                 parts.append(SpectralSurface([low, high], ends, h_max=high))
         both = functools.reduce(SpectralSurface.added, parts)
-        return dataclasses.replace(
+        same = dataclasses.replace(
             both,
             h_max=float(np.asarray(self.h_max)[index]),
             heights=None,
             unit=self.unit,
             provenance=self.provenance,
         )
+        return self.spectral.of(same)
 
     def scaled(self, factor: float, unit: str | None) -> Self:
         """The same surfaces in another length unit; `factor` is the old unit in the new one."""

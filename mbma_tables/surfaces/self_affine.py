@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -113,7 +113,6 @@ class SelfAffine(AnySurface):
     h_rms: Any
     h_max: Any = None
     parameters = PARAMETERS
-    spectral: ClassVar[Any]  # `MeasuredSurface`
     unit: str | None = dataclasses.field(default=None, kw_only=True)
     fit: SpectrumFit | None = dataclasses.field(default=None, repr=False, kw_only=True)
     provenance: tuple[Mapping[str, Any], ...] = dataclasses.field(

@@ -324,9 +324,10 @@ class SpectralSurface(AnySurface):
         return self
 
     def bands_if_few(self) -> tuple[Band, ...]:
-        """The power laws between its samples, where these are few and its heights Gaussian."""
+        """The power laws between its samples, where these are few and all that is known of it."""
         laws = self.laws
-        if laws.width.size > FEW_BANDS or not self.heights.is_gaussian:
+        is_measured = self.anisotropy is not None or self.bearing or self.scans
+        if laws.width.size > FEW_BANDS or is_measured or not self.heights.is_gaussian:
             return ()
         numbers = np.exp(laws.log_low), np.exp(laws.log_high), laws.low, laws.slope
         return tuple(map(Band, *(each.tolist() for each in numbers)))

@@ -26,6 +26,7 @@ BROADENING = 0.8968  # summit variance is (1 - BROADENING/alpha) m0, Eq. (2)
 # limits for a surface; the lower one is above the floors 1.5 and 3 of (27), (30)
 MIN_ZETA_1 = 3.0
 MAX_ZETA_1 = 1e8
+MOST_BANDS = 16  # that the core adds
 SHARES = {0: 1.0, 2: 1 / 2, 4: 3 / 8}  # m_n = share 2 pi integral C q^(n + 1) dq, Eq. (7)
 
 Reals: TypeAlias = float | FloatArray

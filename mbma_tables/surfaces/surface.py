@@ -17,6 +17,7 @@ from mbma_tables.common.arguments import (
     require_name,
 )
 from mbma_tables.common.errors import InputError
+from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.roughness import ASSUMED, GAUSSIAN
 from mbma_tables.surfaces.self_affine import SelfAffine
@@ -467,5 +468,5 @@ def _modelled(
     return surface
 
 
-Surface.spectral = MeasuredSurface
+AnySurface.spectral = MeasuredSurface
 Surface.__init__ = hinted(Surface.__init__)  # type: ignore[method-assign]

@@ -25,6 +25,7 @@ from mbma_tables.export.model import c_code
 from mbma_tables.export.text import page_file
 from mbma_tables.islands.variants import FITTED, PRINTED, REPORTED, get_variant
 from mbma_tables.surfaces.any_surface import AnySurface
+from mbma_tables.surfaces.banded import BandedSurface
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.tables.open import universal_model
 from mbma_tables.theories import default_name, tested
@@ -164,6 +165,8 @@ def explorer_page(
     >>> page.startswith("<!doctype html>"), "<title>a road</title>" in page, len(page) < 4e6
     (True, True, True)
     """
+    if isinstance(surface, BandedSurface) and surface.shape == ():
+        surface = surface.sampled()
     measured = isinstance(surface, MeasuredSurface)
     chosen = get_variant(variant)
     if theory is None:

@@ -128,6 +128,9 @@ def island(
     modulus = positive_array("E_star", E_star)
     model = get_model(with_table(island_model), rtol, rule)
     require("delta", approach, approach >= SMALLEST_DELTA, f"at least {SMALLEST_DELTA:g}")
+    if not isinstance(surface, Surface | MeasuredSurface):
+        # islands of sums of power laws are those of one spectrum at a time
+        surface = surface.sampled()
     broadcast_shape(delta=approach, surface=surface.h_rms, E_star=modulus)
     shape = broadcast_shape(delta=approach, surface=surface.h_rms)
     if isinstance(surface, MeasuredSurface):

@@ -126,7 +126,8 @@ def spectra_of(surface: AnySurface) -> list[MeasuredSurface]:
 def _of_bands(numbers: tuple[float, ...]) -> MeasuredSurface:
     """One sum of power laws by samples of its spectrum; the same object for the same numbers, by which its profile is kept."""
     bands = [Band(*numbers[k : k + 4]) for k in range(1, len(numbers), 4)]
-    return MeasuredSurface.of(BandedSurface(bands, numbers[0]).sampled())
+    sampled: MeasuredSurface = BandedSurface(bands, numbers[0]).sampled()
+    return sampled
 
 
 def _entries_by_surface(
