@@ -74,6 +74,11 @@ def wrong_shape(x):
     return np.zeros(3)
 
 
+def complex_numbers(x):
+    """Numbers with an imaginary part."""
+    return x + 1j
+
+
 def texts(x):
     """No numbers."""
     return ["a"] * x.size

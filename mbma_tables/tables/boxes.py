@@ -144,6 +144,9 @@ class Box:
     trials: int = 0
     coefficients: FloatArray | None = None
     error: FloatArray | None = None  # bound, by output
+    missed: float = (
+        0.0  # largest error over its target, of what it is a half of if it is one
+    )
 
     def at(self, places: FloatArray) -> FloatArray:
         """Coordinates at places in [-1, 1]."""
@@ -274,9 +277,20 @@ class Piece:
             start = last
         if self.size > self.most:
             raise UncertifiedError(
-                f"{self.most} coefficients do not reach the target; ask for a larger one, "
-                "a smaller range, or set max_coefficients"
+                f"{self.most} coefficients do not reach the target{self._left()}; ask for a "
+                "larger one, a smaller range, or set max_coefficients"
             )
+
+    def _left(self) -> str:
+        """What is left to do, as a part of a sentence; after all pending boxes were decided."""
+        missing = self.pending
+        if not missing:
+            return f", which takes {self.size} in this part of the range"
+        worst = max(box.missed for box in missing)
+        return (
+            f": in this part of the range {len(missing)} of {len(self.boxes)} boxes miss "
+            f"it, by up to {worst:.2g} times"
+        )
 
     def _decide(self, box: Box, at_nodes: FloatArray, at_tests: FloatArray) -> None:
         """Whether a box is done, gets more terms, or is halved."""
@@ -290,6 +304,7 @@ class Piece:
         scale_at_tests = self.aim.scale(at_tests)
         error = np.abs(value_at(series, tests(self.axes)) - at_tests) / scale_at_tests
         worst = error.max(axis=1)
+        box.missed = float((worst / self.aim.target).max())
         aim = AIM * self.aim.target + ROUNDING * np.abs(together).max(axis=1) / scale
         tails, ratios = np.empty((2, self.axes, len(scale)))
         for axis in range(self.axes):
@@ -353,7 +368,10 @@ class Piece:
             box.axis = NO_ANSWER
             return
         box.axis, box.child = axis, len(self.boxes)
-        self.boxes += box.halves(axis, terms)
+        halves = box.halves(axis, terms)
+        for half in halves:
+            half.missed = box.missed
+        self.boxes += halves
 
     def _check(self, points: FloatArray, stored: FloatArray) -> None:
         """Errors at held-out points; boxes that miss the target are halved."""

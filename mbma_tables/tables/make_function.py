@@ -330,6 +330,8 @@ def _as_rows(
         # of one output alone, or in a list
         found = found if len(shape) == 2 and shape[0] == 1 else [found]
     try:
+        if any(map(np.iscomplexobj, found)):
+            raise TypeError("they are complex")
         columns = [np.asarray(column, dtype=float) for column in found]
     except (TypeError, ValueError) as fault:
         raise InputError(f"{reference} returned what are no numbers: {fault}") from None
@@ -496,10 +498,12 @@ class Kept:
         """Use the folder of an earlier run of the same configuration, or start a new one."""
         note = self.folder / "configuration.json"
         if note.exists() and resume:
-            if note.read_text(encoding="utf-8") != self.wanted.as_json:
+            text, own = note.read_text(encoding="utf-8"), self.wanted.as_json
+            if text != own:
                 raise InputError(
-                    f"{self.folder} is of another configuration: remove it, or give the same "
-                    "configuration to go on"
+                    f"{self.folder} is of another configuration, with other "
+                    f"{_differences(text, own)}: remove it, or give the same configuration "
+                    "to go on"
                 )
             return
         if note.exists():
@@ -764,6 +768,14 @@ def write(path: pathlib.Path, table: FunctionTable) -> None:
     write_own(path, variables, table.attributes, KIND, FORMAT)
 
 
+def _differences(note: str, other: str) -> str:
+    """Entries in which two configurations differ, for a message."""
+    mine, theirs = map(json.loads, (note, other))
+    return ", ".join(
+        key for key in sorted({*mine, *theirs}) if mine.get(key) != theirs.get(key)
+    )
+
+
 def folder_of(path: pathlib.Path) -> pathlib.Path:
     """The folder in which the pieces of a table are kept while it is made."""
     return path.with_name(f"{path.name}.pieces")
@@ -851,7 +863,10 @@ def merge(path: pathlib.Path, folders: list[pathlib.Path]) -> FunctionTable:
     first = folders[0]
     for folder, note in notes.items():
         if note != notes[first]:
-            raise InputError(f"{folder} is of another configuration than {first}")
+            raise InputError(
+                f"{folder} is of another configuration than {first}: they differ in "
+                f"{_differences(note, notes[first])}"
+            )
     wanted = Wanted.from_json(notes[first])
     pieces = pieces_of(wanted)
     unfinished = []
