@@ -42,7 +42,12 @@ def _programs() -> str:
     with MEASURED.open(encoding="utf-8") as stream:
         measured = {row["target"]: row for row in csv.DictReader(stream)}
     for name, target in targets().items():
-        one = measured[name]
+        one = measured.get(name)
+        if one is None:
+            # a new one, until the command is run
+            cells = ("not measured", "", "", "")
+            rows.append((f"`{name}`", *cells, target.outside, ""))
+            continue
         share = f"{100 * float(one['share']):.2g}%"
         cells = (one["program"], one["laws"], one["error"], share)
         rows.append((f"`{name}`", *cells, target.outside, one["date"]))

@@ -11,6 +11,7 @@ import pytest
 from helpers import skip_without_package
 
 from benchmarks import programs
+from generate.pages import export
 from mbma_tables.export.code.languages import LANGUAGES
 from mbma_tables.export.registry import targets
 
@@ -99,3 +100,12 @@ def test_a_film_without_a_valid_factor_states_its_errors():
     law = programs.rows(one, "film")
     assert programs.in_rows(one, OF_ROWS["csv"], law).share <= 1
     assert law.largest_error > 0
+
+
+def test_a_new_target_is_listed_before_it_is_measured(monkeypatch, tmp_path):
+    """The table failed for one, and its recipe then took a file more."""
+    path = tmp_path / "exports.csv"
+    path.write_text(export.MEASURED.read_text(encoding="utf-8").splitlines()[0] + "\n")
+    monkeypatch.setattr(export, "MEASURED", path)
+    for name in targets():
+        assert f"| `{name}` | not measured |" in export.formats()[0]["programs"]

@@ -1,5 +1,6 @@
 """A joint, a surface, a law and rows reach files by one route: the same text by each way, and the same refusals."""
 
+import hashlib
 import io
 import json
 import pathlib
@@ -61,12 +62,39 @@ def test_both_commands_write_the_same_file_of_a_joint(target, tmp_path):
     again = run("export", target, "--joint", EXAMPLE, *named, *options_of(target))
     assert (again.exit_code, again.output) == (0, done.output)
     second = path.read_bytes()
-    if target in ("netcdf", "hdf5", "parquet", "xlsx", "matlab"):
-        read = OF_ROWS[target].read
-        for one, other in zip(read(first), read(second), strict=True):
-            np.testing.assert_array_equal(one.y, other.y)
-    else:
-        assert without_command(first) == without_command(second)
+    # the same from Python, with the lines of a command
+    digest = hashlib.sha256(EXAMPLE.read_bytes()).hexdigest()
+    command = f"mbma export {target} --out law {' '.join(options_of(target))}".strip()
+    lines = (f"input {EXAMPLE}: sha256 {digest}", f"written by mbma_tables 0: {command}")
+    options = {"name": "bolt", "path": path, "made_by": lines}
+    if target in ("fmu", "fmu3"):
+        options["binaries"] = "none"
+    pressures = ("10kPa", "100MPa") if targets()[target].rows else None
+    Joint.from_toml(EXAMPLE).export(target, pressures, **options)
+    for written in (second, path.read_bytes()):
+        if target in ("netcdf", "hdf5", "parquet", "xlsx", "matlab"):
+            read = OF_ROWS[target].read
+            for one, other in zip(read(first), read(written), strict=True):
+                np.testing.assert_array_equal(one.y, other.y)
+        else:
+            assert without_command(first) == without_command(written)
+
+
+@pytest.mark.parametrize("target", [name for name in OF_LAWS if name not in OF_ROWS])
+def test_a_law_as_code_is_not_made_from_rows(target, rows_of_road, tmp_path):
+    out = tmp_path / "law.txt"
+    done = run("export", target, "--law", rows_of_road, "--out", out)
+    assert done.exit_code == 2
+    said = f"{target} is made from a surface or a joint, not from rows"
+    assert said in done.output
+    assert not out.exists()
+
+
+@pytest.fixture(scope="module")
+def rows_of_road(tmp_path_factory):
+    path = tmp_path_factory.mktemp("rows") / "rows.json"
+    assert run("export", "json", *SURFACE, "--rows", "9", "--out", path).exit_code == 0
+    return path
 
 
 REFUSED = [
