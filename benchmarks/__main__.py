@@ -39,6 +39,7 @@ from benchmarks.programs import exports_command
 from benchmarks.rows import LINES, Line, microseconds, report, rounds, times_faster
 from benchmarks.scenes import scenes
 from benchmarks.surrogates import surrogates
+from benchmarks.table_uses import table_uses
 from generate import page
 from generate.files import ROOT
 from mbma_tables import (
@@ -649,6 +650,7 @@ def joints_command(write: bool) -> None:
 
 
 main.add_command(functions)
+main.add_command(table_uses)
 main.add_command(surrogates)
 main.add_command(display_command)
 main.add_command(exports_command)
