@@ -518,6 +518,11 @@ class _Differences:
         relative = STEP * FINER ** (LEVELS + 1 - levels)
         allowed = SMOOTH * np.maximum(np.abs(slope), size / (step / relative))
         rough = ~(error <= np.maximum(allowed, 10 * noise))
+        # of a kink as of |x|, central differences of every order are equal, and no side's
+        left = np.tensordot(RIGHT_WEIGHTS, found[2::-1], 1) / -step
+        right = np.tensordot(RIGHT_WEIGHTS, found[3:], 1) / step
+        steepest = np.maximum(np.abs(left), np.abs(right))
+        rough |= ~(np.abs(right - left) <= SAME * steepest + 10 * (allowed + noise))
         place, entry = pairs
         table.slopes[place, :, entry] = slope.T
         table.errors[place, :, entry] = (error + noise).T
