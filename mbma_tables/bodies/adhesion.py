@@ -136,6 +136,17 @@ class Adhesion:
             return TRACTIONS[self.traction]
         return _normalized(self.traction)
 
+    def named(self, units: Units) -> Adhesion:
+        """The same attraction with its units, of plain numbers in these; itself where they are not known."""
+        if units.length is None or units.stress in (None, "1"):
+            return self
+        metre = factor("m", units.length)
+        joule = factor("Pa", str(units.stress), "stress") * metre
+        work, length = float(self.work_in(units)), float(self.range_in(units))
+        return dataclasses.replace(
+            self, work=f"{work / joule!r} J/m^2", range=f"{length / metre!r} m"
+        )
+
     def work_in(self, units: Units) -> Any:
         """The work in the unit of stresses times that of lengths, an array if it is one."""
         work = _work(self.work, units)

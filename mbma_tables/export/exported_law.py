@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbma_tables import __version__
+from mbma_tables.bodies.adhesion import Adhesion
 from mbma_tables.bodies.bodies import Bodies, after
 from mbma_tables.bodies.materials import ELASTIC_PSI
 from mbma_tables.common.arguments import FloatArray, Numbers, number_in
@@ -108,6 +109,16 @@ class ExportedLaw:
             if self.ends
             else (self.law.h_max - float(self.law.block[at.HIGHEST])) / 2
         )
+
+    @property
+    def begin(self) -> float:
+        """The least overclosure of rows and functions, at first contact or where the law begins."""
+        return 0.0 if self.ends else max(0.0, self.c_least)
+
+    @property
+    def attracts(self) -> bool:
+        """Whether the bodies attract each other, so that contact has area at no load."""
+        return self.force is None and self.law.setup.bodies.adhesion is not None
 
     @property
     def c_most(self) -> float:
@@ -214,7 +225,25 @@ class ExportedLaw:
     def bodies(self) -> Bodies:
         """Modulus and hardness, and the largest pressure so far, in the units of the file."""
         largest = None if self.force is not None else self.law.setup.bodies.largest
-        return Bodies(self.modulus, hardness=self.hardness, largest_pressure=largest)
+        return Bodies(
+            self.modulus,
+            hardness=self.hardness,
+            largest_pressure=largest,
+            adhesion=self._adhesion,
+        )
+
+    @property
+    def _adhesion(self) -> Adhesion | None:
+        """The attraction in numbers, as the modulus is one."""
+        if not self.attracts:
+            return None
+        setup = self.law.setup.bodies
+        own = setup.adhesion
+        assert own is not None
+        adhesion: Adhesion = dataclasses.replace(
+            setup.bodies.adhesion, work=float(own.work), range=float(own.range)
+        )
+        return adhesion
 
     def of_gas(
         self, gas: GasInGaps | None, unit: str, end: float, included: bool
@@ -226,7 +255,7 @@ class ExportedLaw:
             return (
                 f"{name}_conductance is that of the solid spots alone, without gas in the gaps (contact conductance)",
             )
-        u = self.law.h_max - end * np.linspace(0, 1, GAS_AT)
+        u = self.law.h_max - np.linspace(self.begin, end, GAS_AT)
         values = gas.conductance(self.answer(u))
         pressures = np.asarray(self.law.pressure(u))
         alone = ", ".join(
@@ -244,6 +273,23 @@ class ExportedLaw:
                 f"{gas}"
             )
         return (f"{what}; the gas has {alone} {self.stress}, in {unit}",)
+
+    def _attraction(self) -> tuple[str, ...]:
+        """Lines of a header on the bodies' attraction, and on the branch that the law is."""
+        if not self.attracts:
+            return ()
+        own = self.law.setup.bodies.adhesion
+        assert own is not None
+        begins = f"c = {number(self.c_least)} {self.length}"
+        least = f"{about(float(self.law.pressure(separation=self.law.highest)))}"
+        return (
+            f"adhesion: work {about(float(own.work))} {self.stress} {self.length}, range "
+            f"{about(float(own.range))} {self.length}; pressure is the net one, load less attraction",
+            f"of the contacts that balance a pressure this is the closest, of net pressures from {least} "
+            f"{self.stress} on, at {begins},",
+            "where pressure rises with c; contact at no load and in tension, pull-off and the jump into contact "
+            "are not in it; energy counts from there",
+        )
 
     def header(
         self, what: str, range_: str, *more: str, end: float, leakage: bool = False
@@ -290,6 +336,7 @@ class ExportedLaw:
             *filter(None, [self.surface.resolution, self.theory.origin]),
             f"E* = {number(self.modulus)} {stress}, 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2",
             *meaning,
+            *self._attraction(),
             f"range: {range_}",
             *more,
             f"the law is within {bound(law.error)} of its theory, in pressure and area",
@@ -305,7 +352,8 @@ class ExportedLaw:
         unit = self.stress
         # small overclosures by their logarithm, larger ones evenly
         small = np.geomspace(NEAREST, 1 / LOOKED_AT, SMALL, endpoint=False)
-        u = law.h_max - end * np.append(small, np.linspace(0, 1, LOOKED_AT + 1)[1:])
+        shares = np.append(small, np.linspace(0, 1, LOOKED_AT + 1)[1:])
+        u = law.h_max - self.begin - (end - self.begin) * shares
         found = self.answer(u)
         pressure = np.asarray(law.pressure(u))
         for reason, bad in (found.leakage if leakage else found).reasons.items():
@@ -332,7 +380,7 @@ class ExportedLaw:
                 f"softening: stiffness falls with compression from c = {about(law.h_max - law.softening)}, "
                 f"p = {about(law.pressure(law.softening))} {unit} on, which no simulation shows"
             )
-        if not self.ends:
+        if not self.ends and self.c_least <= 0:
             yield f"no last contact: pressure is {about(law.pressure(law.h_max))} {unit} at c = 0"
         spread = self._spread(
             "one standard deviation of ln p at a given c", found.scatter, pressure
@@ -428,6 +476,7 @@ def exported_law(
     direction: str | float | None = None,
     interface: Interface = NOTHING_BETWEEN,
     largest_pressure: float | str | None = None,
+    adhesion: Adhesion | None = None,
 ) -> ExportedLaw:
     """The law of one surface in known units, of a modulus and a hardness or of `Bodies`; a batch of surfaces and missing units are refused."""
     if isinstance(surface, ForceLaw):
@@ -448,7 +497,11 @@ def exported_law(
             body.surface, surface.law, body.theory, *numbers, force=surface
         )
     one: AnySurface = in_unit(surface, length_unit)
-    given = E_star if isinstance(E_star, Bodies) else Bodies(E_star, hardness=hardness)
+    given = (
+        E_star
+        if isinstance(E_star, Bodies)
+        else Bodies(E_star, hardness=hardness, adhesion=adhesion)
+    )
     if largest_pressure is not None:
         given = after(given, largest_pressure)
     bodies = given.in_units(one, stress_unit)

@@ -13,7 +13,7 @@ from mbma_tables import __version__
 from mbma_tables.bodies.bodies import Bodies, BodiesInUnits
 from mbma_tables.common.arguments import require_name
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.units import HEAT_CONDUCTANCE, factor
+from mbma_tables.common.units import HEAT_CONDUCTANCE, Units, factor
 from mbma_tables.contacts.law.law import ContactLaw
 from mbma_tables.contacts.quantities.gas import VACUUM
 from mbma_tables.contacts.quantities.interface import (
@@ -42,6 +42,8 @@ from mbma_tables.export.targets import (
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories.base import Theory, UserTheory
 
+# options that bodies have in them
+OF_BODIES = ("hardness", "largest_pressure", "adhesion")
 MILLI = 1e3  # mW of a W, the power of the system N, mm, MPa, s
 # numbers of a law with lengths and stresses in such units: the arguments of `describe_law`
 # for conductance, and one W/(m^2 K) in their unit
@@ -161,16 +163,18 @@ def files_of(
     if not isinstance(subject, Subject):
         return _of_rows(subject, program, asked, out)
     options = program.given_options(asked)
-    _refuse_adhesion(subject)
     units = _units(subject, program, options)
     if out is None and not program.alone:
         raise InputError(
             f"{target} is several files, of which the first needs the others: give path"
         )
     named, line_of_name = program.place_of_name(options.name, out)
+    subject = _with_units_of_adhesion(subject, units)
     shared: dict[str, Any] = {"theory": subject.theory, "hardness": subject.hardness}
     shared |= units
     shared |= options.given()
+    if subject.bodies is not None and subject.bodies.adhesion is not None:
+        shared["adhesion"] = subject.bodies.adhesion
     if subject.largest_pressure is not None:
         shared["largest_pressure"] = subject.largest_pressure
     if subject.variant != "reported":
@@ -183,8 +187,8 @@ def files_of(
     bodies: float | str | Bodies = subject.E_star
     if "quantity" in shared and subject.bodies is not None:
         # those of the contact itself
-        del shared["hardness"]
-        shared.pop("largest_pressure", None)
+        for name in OF_BODIES:
+            shared.pop(name, None)
         bodies = subject.bodies
         shared["interface"] = subject.interface
     if "direction" in shared and "leakage" not in shared:
@@ -326,14 +330,21 @@ def _units(subject: Subject, program: Target, options: Options) -> dict[str, str
     return {"length_unit": asked[0], "stress_unit": asked[1]}
 
 
-def _refuse_adhesion(subject: Subject) -> None:
-    """An error for bodies that attract each other: programs press contacts that end at first touch."""
-    if subject.bodies is None or Bodies.of(subject.bodies).adhesion is None:
-        return
-    raise InputError(
-        "a contact with adhesion is not exported yet: pressures of exported laws begin with "
-        "the first contact; contact(..., pressure=[...]).to_dataset() has rows of every "
-        "quantity"
+def _with_units_of_adhesion(subject: Subject, units: Mapping[str, str | None]) -> Subject:
+    """The subject with units of plain numbers of its attraction, as files may have others than the surface."""
+    if subject.bodies is None or subject.bodies.adhesion is None:
+        return subject
+    bodies = subject.bodies
+    known = bodies.in_units(subject.surface).units
+    stress = subject.stress_unit if known.stress in (None, "1") else known.stress
+    named = bodies.adhesion.named(
+        Units(
+            length=known.length or units["length_unit"],
+            stress=stress or units["stress_unit"],
+        )
+    )
+    return dataclasses.replace(
+        subject, bodies=dataclasses.replace(bodies, adhesion=named)
     )
 
 
@@ -420,8 +431,8 @@ def _rows(
         asked.pop("peklenik", None)
     if not of_law and quantity != FILM and subject.bodies is not None:
         # of the contact itself
-        del asked["hardness"]
-        asked.pop("largest_pressure", None)
+        for name in OF_BODIES:
+            asked.pop(name, None)
         return describe_law(
             subject.surface,
             subject.bodies,

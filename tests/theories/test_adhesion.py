@@ -1,6 +1,9 @@
 """Contacts with an attraction: identities, limits, and boundary elements that no constant was fitted to."""
 
+import dataclasses
 import functools
+import io
+import runpy
 
 import numpy as np
 import pandas as pd
@@ -129,10 +132,64 @@ def test_laws_joints_and_leakage_go_by_the_same_contact():
     assert at.mean_separation == pytest.approx(one.mean_separation, rel=1e-6)
     joint = Joint(FACE, bodies=STICKY, theory="calibrated")
     assert joint.at(pressure="2 MPa").area == pytest.approx(one.area, rel=1e-5)
-    with pytest.raises(InputError, match="adhesion"):
-        joint.export("c-law")
     elastic = pressed("1 GPa", mean_separation=one.mean_separation)
     assert pytest.approx(elastic.leakage.K, rel=1e-9) == one.leakage.K
+
+
+def rows_of(text):
+    """Numbers of a CSV file."""
+    return pd.read_csv(io.StringIO(text), comment="#").to_numpy()
+
+
+@pytest.mark.slow
+def test_rows_and_code_are_of_the_contacts_themselves(tmp_path):
+    """Against contacts at their pressures, in other units than the surface's."""
+    bodies = dataclasses.replace(STICKY, conductivity="45 W/(m K)")
+    joint = Joint(FACE, bodies=bodies, theory="calibrated")
+    asked = {"pressures": ("0.5 MPa", "20 MPa"), "rtol": 1e-3}
+    for quantity, own, factor in (
+        ("solid_conductance", "solid_conductance", 1e-3),
+        ("area", "area", 1.0),
+        ("hydraulic_aperture", "hydraulic_aperture", 1e-3),
+    ):
+        pressure, value = rows_of(joint.export("csv", quantity=quantity, **asked))[
+            :, :2
+        ].T
+        found = joint.at_pressure([f"{p} MPa" for p in pressure[1:-1:8]])
+        expected = np.asarray(found.quantity(own)) * factor
+        known = expected > 0
+        assert value[1:-1:8][known] == pytest.approx(expected[known], rel=3e-3), quantity
+    overclosure, pressure = rows_of(joint.export("csv", quantity="pressure", **asked)).T
+    assert overclosure[0] == pressure[0] == 0
+    # errors below the smallest pressure asked for are relative to that
+    above = pressure > 0.5
+    u = [f"{0.35e-3 - c} mm" for c in overclosure[above]]
+    net = contact(FACE, bodies, mean_separation=u, theory="calibrated").pressure
+    assert pressure[above] == pytest.approx(1e3 * net, rel=1.1e-3)
+    file = tmp_path / "law.py"
+    file.write_text(joint.export("python-law"))
+    law = runpy.run_path(str(file))
+    one = pressed(STICKY, pressure="2 MPa")
+    c = 0.35e-3 - 1e-3 * float(one.mean_separation)
+    assert law["pressure"](c) == pytest.approx(2.0, rel=1e-4)
+    assert law["area"](c) == pytest.approx(float(one.area), rel=1e-4)
+    text = joint.export("c-law")
+    assert "adhesion: work" in text
+    assert "pull-off" in text
+    with pytest.raises(InputError, match="adhesion"):
+        joint.export("csv", quantity="film")
+
+
+def test_plain_works_and_ranges_keep_their_units_in_exports():
+    """Numbers of a surface in um and a modulus in GPa, in files of mm and MPa."""
+    plain = Bodies("1 GPa", adhesion=Adhesion(1e-5, 0.01))
+    named, numbers = (
+        rows_of(joint.export("csv", quantity="pressure", pressures=("1 MPa", "20 MPa")))
+        for joint in (
+            Joint(FACE, bodies=bodies, theory="calibrated") for bodies in (STICKY, plain)
+        )
+    )
+    np.testing.assert_allclose(numbers, named, rtol=1e-9)
 
 
 def test_what_is_refused():

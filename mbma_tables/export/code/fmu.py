@@ -213,7 +213,7 @@ def _variables(found: AskedLaw) -> list[dict[str, str]]:
     """XML attributes of each variable, by value reference."""
     exported = found.exported
     asked = {
-        "start": number(0.0 if exported.ends else max(0.0, exported.c_least)),
+        "start": number(exported.begin),
         "max": number(exported.c_most),
     }
     asked |= {} if exported.ends else {"min": number(exported.c_least)}

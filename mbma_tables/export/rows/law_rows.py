@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from mbma_tables.bodies.adhesion import Adhesion
 from mbma_tables.bodies.bodies import Bodies
 from mbma_tables.common.arguments import FloatArray, hinted, number_in, whole_number_in
 from mbma_tables.common.errors import InputError
@@ -98,6 +99,7 @@ def describe_law(
     gas: GasInGaps | None = None,
     most_rows: int | None = None,
     interface: Interface = NOTHING_BETWEEN,
+    adhesion: Adhesion | None = None,
 ) -> LawTable:
     """A contact law as rows for a code that interpolates linearly.
 
@@ -106,7 +108,7 @@ def describe_law(
     surface : Surface
         One surface; or the force law of a rough sphere or cylinder (`RoughContact.law`)
         alone, of pressure as force.
-    E_star, variant, theory, hardness, largest_pressure
+    E_star, variant, theory, hardness, largest_pressure, adhesion
         As for `contact`; with a hardness the law of loading, below a largest pressure that of
         unloading and reloading, and conductance by the stiffness of the frozen contact.
         `Bodies` in place of a modulus have both.
@@ -219,7 +221,13 @@ def describe_law(
         direction,
         interface,
         largest_pressure,
+        adhesion,
     )
+    if film and exported.attracts:
+        raise InputError(
+            "a film has gaps wider than those at which bodies that attract each other bear a "
+            "pressure: give bodies without adhesion"
+        )
     least, end = _range(exported, pressures)
     if film:
         count = whole_number_in(
@@ -280,11 +288,14 @@ def _curve(
     """The law on fine points; what follows the unloading stiffness is `scale` times that, beside the gas."""
     law = exported.law
     # squares: fine where p is a high power of the overclosure
-    c = end * np.linspace(0, 1, FINE) ** (2 if exported.ends else 1)
+    begin = exported.begin
+    c = begin + (end - begin) * np.linspace(0, 1, FINE) ** (2 if exported.ends else 1)
+    # rows begin at zero pressure, wherever the law does
+    c = np.union1d(0.0, c)
     # near full compression pressure may diverge with the logarithm of the mean separation
     u = law.h_max * np.geomspace(max(1 - end / law.h_max, NEAREST_END), LAST_SHARE, LAST)
     c = np.union1d(c, law.h_max - u[1:-1]) if u[0] < u[-1] else c
-    d = law.h_max - 2 * c
+    d = law.h_max - 2 * np.maximum(c, begin)
     pressure = np.asarray(law.pressure(separation=d))
     stiffness = np.asarray(law.stiffness(separation=d))
     pressure[0] = stiffness[0] = 0.0
@@ -300,10 +311,13 @@ def _curve(
         return pressure[open_], flow[open_] ** power
     if exported.hardness < np.inf:
         stiffness[1:] = exported.answer(law.h_max - c[1:]).unloading_stiffness
+    if exported.attracts:
+        # what follows it does so at no load, too
+        stiffness = np.asarray(law.unloading_stiffness(separation=d))
     values = scale * stiffness
     if gas is not None:
         # the gaps of first contact conduct, too
-        values += gas.conductance(exported.answer(law.h_max - c))
+        values += gas.conductance(exported.answer(law.h_max - np.maximum(c, begin)))
     return pressure[rises], values[rises]
 
 
@@ -433,7 +447,9 @@ def _table(
         *(
             []
             if exported.ends
-            else ["the first row is zero, whatever the theory has up to the second"]
+            else [
+                "the first row has zero pressure, whatever the theory has up to the second"
+            ]
         ),
         *said,
         end=end,
@@ -472,7 +488,7 @@ def _rows_of_registry(
         # rows begin at the last fine point below the smallest pressure
         first = max(int(np.searchsorted(pressure, least, side="right")) - 1, 0)
         c, pressure = c[first:], pressure[first:]
-    pressed = law.at(separation=law.h_max - 2 * c)
+    pressed = law.at(separation=law.h_max - 2 * np.maximum(c, exported.begin))
     declared = in_files()[quantity]
     values = np.asarray(pressed.quantity(quantity))
     if values.dtype == bool:
@@ -537,8 +553,13 @@ def _of_aperture(
 ) -> tuple[dict[str, tuple[FloatArray, str]], list[str]]:
     """Columns beside the hydraulic aperture, at pressures x, and the lines of a header on their rows."""
     law = exported.law
-    at_rows = law.at_pressure(x)
-    at_fine = law.at_pressure(fine_x)
+    # of laws that begin above zero pressure the first row is where they do
+    least = 0.0
+    if not exported.ends:
+        least = float(law.pressure(separation=law.h_max - 2 * exported.begin))
+        fine_x, fine_y = fine_x[1:], fine_y[1:]
+    at_rows = law.at_pressure(np.maximum(x, least))
+    at_fine = law.at_pressure(np.maximum(fine_x, least))
     u = np.asarray(at_rows.mean_separation)
     fine_u = np.asarray(at_fine.mean_separation)
     fine_derivative = np.gradient(fine_y, fine_u)
