@@ -181,6 +181,19 @@ def face_of(row: Any, name: str) -> Any:
     return _FACES[key]
 
 
+def elastic(rows: pd.DataFrame, name: str) -> pd.DataFrame:
+    """What a theory answers at the same net pressures without attraction: areas over A0, gaps in h_rms."""
+    found = []
+    for row in rows.itertuples():
+        face: Any = face_of(row, name)
+        free = contact(
+            face, 1.0, pressure=float(row.net_pressure) * GRADIENT, theory=name
+        )
+        gap = float(free.mean_separation) / float(face.h_rms)
+        found.append([float(free.area), gap])
+    return pd.DataFrame(found, columns=["area", "gap"], index=rows.index)
+
+
 def _answer(row: Any, name: str) -> list[Any]:
     face = face_of(row, name)
     h_rms = float(face.h_rms)
@@ -239,6 +252,12 @@ def _compare(rows: pd.DataFrame) -> None:
         of_area = np.log(found.area / under_compression(pressed)).abs()
         of_gap = (found.gap - pressed.mean_separation).abs()
         relative = np.log(found.gap / pressed.mean_separation).abs()
+        # errors of the theory without attraction, and of what the attraction adds
+        free = elastic(pressed, name)
+        own_area = np.log(free.area / pressed.elastic_area)
+        own_gap = np.log(free.gap / pressed.elastic_separation)
+        area_grown = (np.log(found.area / under_compression(pressed)) - own_area).abs()
+        gap_grown = (np.log(found.gap / pressed.mean_separation) - own_gap).abs()
         for fitted, number in itertools.product((1, 0), TABOR):
             chosen = (pressed.tabor == number) & (pressed.fitted == fitted) & found.valid
             area, gap = of_area[chosen], relative[chosen]
@@ -247,5 +266,8 @@ def _compare(rows: pd.DataFrame) -> None:
             click.echo(
                 f"{name}, fitted {fitted}, Tabor {number:g}: {chosen.sum()} valid; "
                 f"area {area.median():.3f} {area.quantile(0.9):.3f}, {within.mean():.0%} within two; "
-                f"gap {gap.median():.3f} {gap.quantile(0.9):.3f}, {gap_within.mean():.0%}"
+                f"gap {gap.median():.3f} {gap.quantile(0.9):.3f}, {gap_within.mean():.0%}; nine in ten "
+                f"without attraction {own_area[chosen].abs().quantile(0.9):.3f} "
+                f"{own_gap[chosen].abs().quantile(0.9):.3f}, of the change by it "
+                f"{area_grown[chosen].quantile(0.9):.3f} {gap_grown[chosen].quantile(0.9):.3f}"
             )
