@@ -48,7 +48,7 @@ def _programs() -> str:
             cells = ("not measured", "", "", "")
             rows.append((f"`{name}`", *cells, target.outside, ""))
             continue
-        share = f"{100 * float(one['share']):.2g}%"
+        share = f"{100 * float(one['share']):.0f}%"
         cells = (one["program"], one["laws"], one["error"], share)
         rows.append((f"`{name}`", *cells, target.outside, one["date"]))
     header = (
