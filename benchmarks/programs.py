@@ -21,7 +21,7 @@ import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import click
@@ -437,12 +437,16 @@ def _overclosures(law: ContactLaw, kind: str) -> tuple[FloatArray, FloatArray]:
 
 
 def run(
-    program: Program, names: list[str], c: FloatArray, folder: pathlib.Path
+    program: Program,
+    names: list[str],
+    c: FloatArray,
+    folder: pathlib.Path,
+    laws: Sequence[str] = ("road",),
 ) -> FloatArray:
-    """What the program of a language answers, a row for each function."""
-    (folder / program.file).write_text(program.written("road", names))
+    """What the program of a language answers, a row for each function of each law."""
+    (folder / program.file).write_text(program.written(laws, names))
     np.savetxt(folder / "c.txt", c, "%.17g")
-    for command in program.commands:
+    for command in program.built(laws):
         words = command.replace("python ", f"{sys.executable} ").split()
         done = subprocess.run(words, cwd=folder, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr

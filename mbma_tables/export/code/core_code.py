@@ -40,18 +40,18 @@ CHECK = (
     *("gcc", "-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"),
     *("-fsyntax-only", "{file}"),
 )
-# prints the functions of a law at overclosures, for tests
+# prints functions of laws at overclosures, for tests
 PROGRAM = """\
 #include <stdio.h>
-{% for function in functions %}
-double {{ name }}_{{ function }}(double c);
+{% for law, function in asked %}
+double {{ law }}_{{ function }}(double c);
 {% endfor %}
 int main(void) {
     FILE *in = fopen("c.txt", "r"), *out = fopen("values.txt", "w");
     double c;
     while (fscanf(in, "%lf", &c) == 1) {
-{% for function in functions %}
-        fprintf(out, "%.17g ", {{ name }}_{{ function }}(c));
+{% for law, function in asked %}
+        fprintf(out, "%.17g ", {{ law }}_{{ function }}(c));
 {% endfor %}
         fprintf(out, "\\n");
     }
@@ -79,7 +79,10 @@ def c_language(usage: str, of_solver: str = "", **options: Any) -> Language:
         program=Program(
             "ask.c",
             PROGRAM + of_solver,
-            ("gcc -std=c99 -O1 road.c ask.c -lm -o ask", "./ask"),
+            (
+                "gcc -std=c99 -O1{% for law in laws %} {{ law }}.c{% endfor %} ask.c -lm -o ask",
+                "./ask",
+            ),
             ".c",
         ),
         number=functools.partial(number, infinity="INFINITY", missing="(double)NAN"),

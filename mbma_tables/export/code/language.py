@@ -49,19 +49,25 @@ def evaluator(name: str) -> str:
 
 
 class Program(NamedTuple):
-    """A program that asks a law, which tests run: it writes the values of functions at the overclosures of c.txt."""
+    """A program that asks laws, which tests run: it writes the values of functions at the overclosures of c.txt."""
 
     file: str
-    #: a template, of `name` and `functions`: it writes a line of values.txt for each line of
-    #: c.txt, a number for each function
+    #: a template, of `laws` by name and of `asked`, pairs of a law and its function: it writes
+    #: a line of values.txt for each line of c.txt, a number for each pair
     text: str
-    commands: tuple[str, ...]  # that build and run it beside the law, road.END
-    end: str  # of the law's file
+    #: templates of commands, that build and run it beside the files of `laws`
+    commands: tuple[str, ...]
+    end: str  # of a law's file
     modules: tuple[str, ...] = ()  # of Python that it needs
 
-    def written(self, name: str, functions: Sequence[str]) -> str:
-        """Its text for a law of this name."""
-        return rendered(self.text, name=name, functions=functions)
+    def written(self, laws: Sequence[str], functions: Sequence[str]) -> str:
+        """Its text for laws of these names, the same functions of each."""
+        asked = [(law, function) for law in laws for function in functions]
+        return rendered(self.text, laws=laws, asked=asked)
+
+    def built(self, laws: Sequence[str]) -> list[str]:
+        """The commands that build and run it."""
+        return [rendered(command, laws=laws) for command in self.commands]
 
 
 class Beside(NamedTuple):

@@ -39,7 +39,9 @@ PROGRAM = Program(
     """\
 program ask
   use, intrinsic :: iso_fortran_env, only: dp => real64
-  use {{ name }}
+{% for law, function in asked %}
+  use {{ law }}, only: {{ law }}_{{ function }} => {{ function }}
+{% endfor %}
   implicit none
   real(dp) :: c
   integer :: status
@@ -48,17 +50,17 @@ program ask
   do
     read (10, *, iostat=status) c
     if (status /= 0) exit
-{% for function in functions %}
-    write (11, "(es25.16e3)", advance="no") {{ function }}(c)
+{% for law, function in asked %}
+    write (11, "(es25.16e3)", advance="no") {{ law }}_{{ function }}(c)
 {% endfor %}
     write (11, *)
   end do
 end program
 """,
     (
-        "gcc -std=c99 -O1 -c road_c.c",
-        "gfortran -std=f2008 -Wall -Wextra -Wpedantic -Werror -fcheck=all -O1 road_c.o "
-        "road.f90 ask.f90 -o ask",
+        "gcc -std=c99 -O1 -c{% for law in laws %} {{ law }}_c.c{% endfor %}",
+        "gfortran -std=f2008 -Wall -Wextra -Wpedantic -Werror -fcheck=all -O1"
+        "{% for law in laws %} {{ law }}_c.o {{ law }}.f90{% endfor %} ask.f90 -o ask",
         "./ask",
     ),
     ".f90",

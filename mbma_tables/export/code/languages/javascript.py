@@ -28,10 +28,12 @@ PROGRAM = Program(
     "ask.mjs",
     """\
 import { readFileSync, writeFileSync } from "node:fs";
-import * as {{ name }} from "./{{ name }}.mjs";
+{% for law in laws %}
+import * as {{ law }} from "./{{ law }}.mjs";
+{% endfor %}
 const rows = readFileSync("c.txt", "utf8").trim().split("\\n").map(Number).map((c) => [
-{% for function in functions %}
-  {{ name }}.{{ function }}(c),
+{% for law, function in asked %}
+  {{ law }}.{{ function }}(c),
 {% endfor %}
 ].join(" "));
 writeFileSync("values.txt", rows.join("\\n"));

@@ -18,9 +18,12 @@ def _reserved() -> frozenset[str]:
 PROGRAM = Program(
     "ask.m",
     """\
-law = {{ name }}(); c = load('c.txt'); values = [];
-{% for function in functions %}
-values(:, end + 1) = law.{{ function }}(c(:));
+{% for law in laws %}
+of_{{ law }} = {{ law }}();
+{% endfor %}
+c = load('c.txt'); values = [];
+{% for law, function in asked %}
+values(:, end + 1) = of_{{ law }}.{{ function }}(c(:));
 {% endfor %}
 file = fopen('values.txt', 'w');
 fprintf(file, [repmat('%.17g ', 1, size(values, 2)), '\\n'], values'); fclose(file);

@@ -85,13 +85,13 @@ package asked
 end asked;
 model Ask
   Real c;
-{% for function in functions %}
+{% for _ in asked %}
   Real y{{ loop.index }};
 {% endfor %}
 equation
   c = asked.at(time);
-{% for function in functions %}
-  y{{ loop.index }} = {{ name }}.{{ function }}(c);
+{% for law, function in asked %}
+  y{{ loop.index }} = {{ law }}.{{ function }}(c);
 {% endfor %}
 end Ask;
 '''
@@ -101,10 +101,11 @@ model = MODEL.replace("SIZE", str(c.size)).replace("GAPS", gaps)
 # in a folder of its own: rumoca reads all files beside one
 both = pathlib.Path("both", "both.mo")
 both.parent.mkdir()
-both.write_text(pathlib.Path("{{ name }}.mo").read_text() + model)
+laws = [pathlib.Path(f"{name}.mo").read_text() for name in "{{ laws | join(" ") }}".split()]
+both.write_text("".join(laws) + model)
 found = rumoca.Session().load(str(both), model="Ask").simulate(t=(0, c.size - 1), dt=1)
 assert (np.asarray(found["c"]) == c).all()
-columns = [found[f"y{k + 1}"] for k in range({{ functions|length }})]
+columns = [found[f"y{k + 1}"] for k in range({{ asked | length }})]
 np.savetxt("values.txt", np.transpose(columns), "%.17g")
 """,
     ("python ask.py",),

@@ -22,11 +22,11 @@ def _program(begin: str, *modules: str) -> Program:
     text = f"""\\
 {begin}
 import numpy as np
-import {{{{ name }}}}
+import {{{{ laws | join(", ") }}}}
 c = np.loadtxt("c.txt", ndmin=1)
 values = [
-{{% for function in functions %}}
-    {{{{ name }}}}.{{{{ function }}}}(c),
+{{% for law, function in asked %}}
+    {{{{ law }}}}.{{{{ function }}}}(c),
 {{% endfor %}}
 ]
 np.savetxt("values.txt", np.transpose(values), "%.17g")
