@@ -39,6 +39,7 @@ FILES = {
     "raw_maps.csv.gz": ("maps as an instrument gives them, on finer grids", "raw_maps"),
     "last_octave.csv": ("area with and without the shortest octave", "last_octave"),
     "artefacts.csv": ("maps with planted artefacts", "artefacts"),
+    "exports.csv": ("largest errors of exported laws by target", ""),
     "boundary_elements.csv": ("an earlier campaign", ""),
     "hardness.csv": ("an earlier campaign with a hardness", ""),
     "leakage.csv": ("an earlier campaign of flow", ""),

@@ -526,7 +526,7 @@ class Joint(JointQuantities, Displayed):
     ) -> Joint:
         """The joint of the entries of a TOML file, whose path is that of a file of maps and of messages."""
         given = dict(entries)
-        take_theory(given, options_of("mbma"), path.parent)
+        take_theory(given, options_of("mbma"), pathlib.Path(path).parent)
         for name in FACES:
             part = given.get(name)
             if isinstance(part, Mapping) and "map" in part:

@@ -375,11 +375,15 @@ class Theory(abc.ABC):
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Elastic energy over A0 E* [length], the integral of F/(A0 E*) from u to last contact."""
+        u = np.asarray(mean_separation, dtype=float)
+        return self.work_between(surface, u, self.interval(surface)[1])
+
+    def work_between(self, surface: AnySurface, u: FloatArray, end: Any) -> FloatArray:
+        """Integral of F/(A0 E*) from mean separations u to `end` [length], zero beyond it."""
         from scipy.integrate import tanhsinh
 
-        u = np.asarray(mean_separation, dtype=float)
         shape = u.shape
-        last_contact = np.broadcast_to(self.interval(surface)[1], shape)
+        last_contact = np.broadcast_to(end, shape)
         first = np.minimum(u, last_contact)
         # from bend to bend, across which no rule converges
         bends = [np.clip(bend, first, last_contact) for bend in self.bends(surface)]

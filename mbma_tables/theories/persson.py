@@ -26,6 +26,7 @@ from mbma_tables.theories.calibrated.spectra import Spectra, laws_of
 Method = Literal["full", "simplified"]
 
 LAMBDA = 4.047  # Eq. (21b)
+NEGLIGIBLE = 1e-25  # share of a pressure, down to which energies are integrated
 LEAST = 1e-300  # least force over A0 E* g, a normal number
 INVERSE_RTOL = 1e-10  # error of a load found from its separation
 
@@ -228,7 +229,12 @@ class Persson(Theory):
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         if isinstance(surface, BandedSurface):
-            return super().energy(surface, mean_separation)
+            u = np.asarray(mean_separation, dtype=float)
+            pressure = self.answer(surface, u).pressure
+            # heights are unbounded: what lies beyond is less than rounding
+            light = np.maximum(NEGLIGIBLE * pressure, 2 * LEAST)
+            end = self.mean_separation_at(surface, "pressure", light)
+            return self.work_between(surface, u, end)
         gradient = np.asarray(surface.rms_gradient)
         load = self.answer(surface, mean_separation).pressure / gradient
         return np.asarray(

@@ -33,7 +33,8 @@ from mbma_tables.islands.geometry import (
 from mbma_tables.islands.island_models import AnyModel, answer_islands
 from mbma_tables.islands.variants import Variant
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.spectrum import Place
+from mbma_tables.surfaces.banded import BandedSurface
+from mbma_tables.surfaces.spectrum import Band, Place
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.tables.universal import UniversalModel
 from mbma_tables.theories.mbma.island import refuse_bands, scale_area, scale_force
@@ -56,11 +57,27 @@ Fields = Callable[[FloatArray, NDArray[np.bool_]], tuple[FloatArray, float]]
 Nodes = tuple[FloatArray, FloatArray, FloatArray, NDArray[np.int64]]
 
 
+def spectra_of(surface: AnySurface) -> list[MeasuredSurface]:
+    """One surface given by its spectrum, or those of a batch of sums of power laws, in their order."""
+    if isinstance(surface, MeasuredSurface):
+        return [surface]
+    numbers = np.broadcast_arrays(*surface.numbers().values())
+    rows = np.reshape(numbers, (len(numbers), -1)).T.tolist()
+    return [_of_bands(tuple(row)) for row in rows]
+
+
+@shared(KEPT)
+def _of_bands(numbers: tuple[float, ...]) -> MeasuredSurface:
+    """One sum of power laws by samples of its spectrum; the same object for the same numbers, by which its profile is kept."""
+    bands = [Band(*numbers[k : k + 4]) for k in range(1, len(numbers), 4)]
+    sampled: MeasuredSurface = BandedSurface(bands, numbers[0]).sampled()
+    return sampled
+
+
 def shape_of(surface: AnySurface) -> Shape:
     """One surface as `profile` takes it."""
     if not isinstance(surface, Surface):
-        assert isinstance(surface, MeasuredSurface)
-        return surface
+        return spectra_of(surface)[0]
     peak = float(surface.h_max / surface.h_rms)
     return float(surface.hurst), float(surface.zeta_1), peak
 

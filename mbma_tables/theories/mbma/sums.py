@@ -17,19 +17,22 @@ from numpy.typing import NDArray
 from mbma_tables.common.arguments import FloatArray, grouped, spread
 from mbma_tables.common.errors import ConvergenceError, MbmaError, OutOfRangeError
 from mbma_tables.common.interrupts import in_blocks
-from mbma_tables.common.shared import shared
 from mbma_tables.core import OK, UNRESOLVED, core
 from mbma_tables.islands.island_models import AnyModel, RigidModel, exact_model
 from mbma_tables.islands.variants import Variant
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.banded import BandedSurface
-from mbma_tables.surfaces.spectrum import Band
 from mbma_tables.surfaces.surface import MeasuredSurface, Surface
 from mbma_tables.tables.island4d import Island4dModel
 from mbma_tables.tables.universal import UniversalModel
 from mbma_tables.theories.base import Solved
 from mbma_tables.theories.mbma.island import islands_of, loads_of
-from mbma_tables.theories.mbma.profile import Shape, profile, shape_of, source_of
+from mbma_tables.theories.mbma.profile import (
+    Shape,
+    profile,
+    shape_of,
+    source_of,
+    spectra_of,
+)
 
 QUADRATURE_SHARE = 0.9  # of the requested tolerance; a table's own error comes on top
 BLOCK = 256  # pairs between two checks for interrupts
@@ -67,8 +70,13 @@ def totals_at(
     depth = np.asarray(surface.h_max - gap)
     # the unit of stress of the islands (Section 1), E* q0 s; of a measured surface, E*
     stress = modulus * surface.q0 * surface.s if isinstance(surface, Surface) else modulus
+    # of sums of power laws that of their samples, whose profiles are summed
+    height: Any = surface.h_rms
+    if not isinstance(surface, Surface | MeasuredSurface):
+        heights = [float(each.h_rms) for each in spectra_of(surface)]
+        height = np.reshape(heights, surface.shape)
     try:
-        rows, islands = _sums(surface, depth, how, slopes)
+        rows, islands = _sums(surface, depth, np.asarray(depth / height), how, slopes)
     except (ConvergenceError, OutOfRangeError) as fault:
         if fault.mask is not None:
             fault.mask = fault.mask.reshape(shape)
@@ -84,8 +92,8 @@ def totals_at(
         return Solved(pressure[()], area[()], error[()], islands)
 
     # by the compression (h_max - d)/h_rms in the sums
-    pressure_slope = stress * (-rows[2].reshape(shape) / surface.h_rms)
-    area_slope = -rows[3].reshape(shape) / surface.h_rms
+    pressure_slope = stress * (-rows[2].reshape(shape) / height)
+    area_slope = -rows[3].reshape(shape) / height
     if is_cover:
         # dA = exp(-sum) dsum
         area_slope = area_slope * np.exp(-area_sum)
@@ -111,23 +119,6 @@ def _add_error_of_underflow(rows: FloatArray) -> None:
     if tiny.any():
         of_rounding = SUBNORMAL / least[tiny].clip(SUBNORMAL)
         error[tiny] = np.minimum(error[tiny] + of_rounding, 1.0)
-
-
-def spectra_of(surface: AnySurface) -> list[MeasuredSurface]:
-    """One surface given by its spectrum, or those of a batch of sums of power laws, in their order."""
-    if isinstance(surface, MeasuredSurface):
-        return [surface]
-    numbers = np.broadcast_arrays(*surface.numbers().values())
-    rows = np.reshape(numbers, (len(numbers), -1)).T.tolist()
-    return [_of_bands(tuple(row)) for row in rows]
-
-
-@shared(KEPT)
-def _of_bands(numbers: tuple[float, ...]) -> MeasuredSurface:
-    """One sum of power laws by samples of its spectrum; the same object for the same numbers, by which its profile is kept."""
-    bands = [Band(*numbers[k : k + 4]) for k in range(1, len(numbers), 4)]
-    sampled: MeasuredSurface = BandedSurface(bands, numbers[0]).sampled()
-    return sampled
 
 
 def _entries_by_surface(
@@ -247,7 +238,11 @@ def by_table(
 
 
 def _sums(
-    surface: AnySurface, depth: FloatArray, how: Sums, slopes: bool
+    surface: AnySurface,
+    depth: FloatArray,
+    compression: FloatArray,
+    how: Sums,
+    slopes: bool,
 ) -> tuple[FloatArray, int]:
     """Force, area, perhaps slopes of both by the compression, and their error as rows.
 
@@ -255,7 +250,6 @@ def _sums(
     gap.
     """
     size = depth.size
-    compression = np.asarray(depth / surface.h_rms)
     rows = np.zeros((5 if slopes else 3, size))
     left = np.flatnonzero(compression > 0)
     islands = 0

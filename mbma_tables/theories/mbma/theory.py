@@ -35,11 +35,10 @@ from mbma_tables.theories.base import (
 from mbma_tables.theories.inversion import Curve
 from mbma_tables.theories.mbma.island import check_band
 from mbma_tables.theories.mbma.models import get_model, with_table
-from mbma_tables.theories.mbma.profile import Shape, profile, shape_of
+from mbma_tables.theories.mbma.profile import Shape, profile, shape_of, spectra_of
 from mbma_tables.theories.mbma.sums import (
     QUADRATURE_SHARE,
     Sums,
-    spectra_of,
     totals_at,
 )
 
@@ -170,6 +169,8 @@ class Mbma(Theory):
         # the sums over islands are to be ten times as accurate as the polynomials
         rtol_of_sums = max(0.1 * rtol, MIN_RTOL)
         model = get_model(self.island_model, rtol_of_sums, self.variant)
+        if not isinstance(surface, Surface):
+            (surface,) = spectra_of(surface)
         h_max = float(surface.h_max)
         h_rms = float(surface.h_rms)
         stress = 1.0
