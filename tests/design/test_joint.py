@@ -1083,7 +1083,9 @@ def test_exports_about_a_preload_are_of_unloading():
     )
     code = joint.export("c-law")
     assert "jump at the largest pressure" in code
-    assert "solid_conductance" not in code.replace("without", "")
+    # the core's own function of this name is not one of the law
+    own = code.replace("mbma_solid_conductances", "").replace("without", "")
+    assert "solid_conductance" not in own
 
 
 def test_the_numbers_of_a_joint_are_checked_once(monkeypatch):
