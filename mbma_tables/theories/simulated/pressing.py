@@ -247,8 +247,9 @@ class Press:
                 # once blocked both ways, heavier loads are
                 if not found[max(found)][:2].any():
                     break
-            while len(found) < len(every) + FLOWS:
-                steep = self._steep(found, x)[:side_by_side]
+            most = len(found) + FLOWS
+            while len(found) < most:
+                steep = self._steep(found, x)[: min(side_by_side, most - len(found))]
                 if not steep:
                     break
                 add(steep)
