@@ -213,10 +213,6 @@ class ContactFunction:
         """A function of what is described by x: in one batch, or entry by entry where no batch can be made."""
         columns = self._checked(x)
         at_once = self.described.is_batched(self.numbers, self.quantities)
-        if at_once and columns.ndim == 1:
-            # a batch of one: one joint has a sampled spectrum, which differs by 1e-6
-            [found] = function(self._moved(columns[None]))
-            return np.asarray(found)
         if at_once or columns.ndim == 1:
             return function(self._moved(columns))
         shape = columns.shape[:-1]
