@@ -15,6 +15,7 @@ enum {
     NUMBERS = 6144, /* coordinates of the points that are sorted by their cells at a time */
     POINTS = 3072,  /* these points at most */
     WAITING = 13,   /* boxes, each with at least as many points as what is answered before it: log2 of POINTS */
+    NO_AXIS = MBMA_MAX_AXES, /* more than any axis */
     MOST_PASSES = 99 /* over the points of an inverse that are not answered yet */
 };
 static const double ROUNDED = 1e-15;  /* what rounding leaves of a sum, over its size */
@@ -271,11 +272,13 @@ static void answer(const mbma_cell_table *t, const cell_of_points *cell, size_t 
     }
 }
 
-/* Polynomials of all axes at up to WIDTH points of a box. */
+/* Polynomials of the axes, but perhaps of one that is left out, at up to WIDTH points of a box. */
 static void fill_points(cell_of_points *cell, const box *in, const double *places, size_t step, const uint16_t *points,
-                        size_t count, bool slopes) {
+                        size_t count, bool slopes, size_t left_out) {
     for (size_t a = 0; a < cell->axes; a++) {
         double place[WIDTH];
+        if (a == left_out)
+            continue;
         /* points that there are not repeat the last one */
         for (size_t l = 0; l < WIDTH; l++)
             place[l] = places[a * step + points[l < count ? l : count - 1]];
@@ -294,7 +297,7 @@ static size_t answer_box(const mbma_cell_table *t, const box *in, const double *
     }
     for (size_t k = in->begin; k < in->end; k += WIDTH) {
         const size_t count = in->end - k < WIDTH ? in->end - k : WIDTH;
-        fill_points(&cell, in, places, step, order + k, count, to->slopes != NULL);
+        fill_points(&cell, in, places, step, order + k, count, to->slopes != NULL, NO_AXIS);
         for (size_t l = 0; l < count; l++)
             to->cells[order[k + l]] = t->branches[2 * in->number + 1];
         for (size_t f = 0; f < t->outputs; f++)
@@ -534,7 +537,8 @@ static void solve_box(const mbma_cell_table *t, const box *in, const double *pla
     for (size_t k = in->begin; is_there && k < in->end; k += WIDTH) {
         const size_t count = in->end - k < WIDTH ? in->end - k : WIDTH, terms = cell.terms[by->of->axis];
         double rows[MBMA_MAX_TERMS][WIDTH];
-        fill_points(&cell, in, places, step, order + k, count, false);
+        /* where a point is looked for along its own axis is no place of it */
+        fill_points(&cell, in, places, step, order + k, count, false, by->of->axis);
         memset(rows, 0, terms * sizeof *rows);
         fold(&cell, 0, by->of->axis, 0, cell.coefficients + by->of->output * cell.size, one, rows);
         solve_points(t, in, rows, terms, order + k, count, by, to);
