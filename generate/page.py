@@ -110,6 +110,13 @@ def percent(value: float) -> str:
     return f"{float(f'{100 * value:.2g}'):g}" if math.isfinite(value) else "—"
 
 
+def as_error(deviation: float) -> str:
+    """A difference of logarithms in percent, or as a factor where it is large."""
+    if deviation < 0.5:
+        return f"{100 * math.expm1(deviation):.2g}%"
+    return f"factor {math.exp(deviation):.2g}"
+
+
 def duration(seconds: float) -> str:
     """A time to two digits, in its unit."""
     unit = next((unit for unit, size in UNITS.items() if seconds >= size), "ns")

@@ -20,7 +20,7 @@ from benchmarks.import_circles import import_graph
 from generate.boundary_elements.evidence import evidence
 from generate.distances import pocket_errors
 from generate.files import ROOT, read_csv
-from generate.page import Cell, Measured, duration, panels, table
+from generate.page import Cell, Measured, as_error, duration, panels, table
 from generate.pages.ideas import ideas
 from mbma_tables import Surface, contact
 from mbma_tables.common.plots import draw_compression, theory_label
@@ -289,21 +289,14 @@ def picture() -> Figure:
     return figure
 
 
-def _as_error(deviation: float) -> str:
-    """A difference of logarithms in percent, or as a factor where it is large."""
-    if deviation < 0.5:
-        return f"{100 * math.expm1(deviation):.2g}%"
-    return f"factor {math.exp(deviation):.2g}"
-
-
 def readme() -> Measured:
     measured = read_csv(ROOT / "tables" / "distance.csv")
     distances = {(row.theory, row.way): row for row in measured.itertuples()}
     rows = []
     for key, what in ROWS.items():
         row = distances[key]
-        area = f"{_as_error(row.area_light)} / {_as_error(row.area_deep)}"
-        force = f"{_as_error(row.force_light)} / {_as_error(row.force_deep)}"
+        area = f"{as_error(row.area_light)} / {as_error(row.area_deep)}"
+        force = f"{as_error(row.force_light)} / {as_error(row.force_deep)}"
         rows.append([what, area, force, duration(row.cost * shipped_costs().seconds)])
     header = (
         "theory | error of area at given pressure"

@@ -1,6 +1,5 @@
 """How far each kind of answer is from simulations: the table of docs/howto/trust.md."""
 
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -8,12 +7,11 @@ import pandas as pd
 
 from generate import distances
 from generate.machined import profiles, raw_maps
-from generate.page import Cell, Measured, table
+from generate.page import Cell, Measured, as_error, table
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.surfaces.roughness import processes
 
 SHARE = 0.9  # of the errors that lie below the numbers of the table
-FACTOR = 0.5  # errors of logarithms above it are written as factors
 DATA_SETS = ("spectra", "surfaces")  # that no fit saw
 THEORIES = {"calibrated": "calibrated", "Persson": "persson", "MBMA reported": "mbma"}
 NUMBERS = "five numbers or a spectrum, of a Gaussian and isotropic face"
@@ -30,13 +28,7 @@ def measure() -> Measured:
 
 def _error(errors: Sequence[float] | FloatArray | pd.Series) -> str:
     values = np.abs(np.asarray(errors, dtype=float))
-    return _as_error(float(np.quantile(values[np.isfinite(values)], SHARE)))
-
-
-def _as_error(logarithm: float) -> str:
-    if logarithm < FACTOR:
-        return f"{math.expm1(logarithm):.1%}"
-    return f"factor {math.exp(logarithm):.1f}"
+    return as_error(float(np.quantile(values[np.isfinite(values)], SHARE)))
 
 
 def _of_numbers() -> Iterator[list[Cell]]:
@@ -96,7 +88,7 @@ def _of_drawings() -> list[Cell]:
     ranges = []
     for name in ("area", "gap", "stiffness"):
         spreads = [float(row[f"{name}_spread"]) for row in rows]
-        ranges.append(f"{_as_error(min(spreads))} to {_as_error(max(spreads))}")
+        ranges.append(f"{as_error(min(spreads))} to {as_error(max(spreads))}")
     area, gap, stiffness = ranges
     maps = sum(int(row["maps"]) for row in rows)
     return [
