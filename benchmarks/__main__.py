@@ -636,7 +636,7 @@ def _put(block: str, lines: list[Line], load: float) -> None:
         match[2]: match[0].removeprefix(match[1]).removesuffix(match[3]).strip("\n")
         for match in page.MARKED.finditer(text)
     }
-    page.write("lookup", parts | {block: f"{machine}\n\n{measured}"}, {}, ROOT)
+    page.write("docs/lookup.md", parts | {block: f"{machine}\n\n{measured}"}, {}, ROOT)
 
 
 @main.command("joints")

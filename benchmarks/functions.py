@@ -158,5 +158,5 @@ def functions(out: pathlib.Path) -> None:
     cells.append(row_of("island", {"axes": _island_axes()} | LOG, 2e-5, ISLAND_POINTS))
     text = page.table(HEADER, cells)
     click.echo(text)
-    for path in page.write("functions", {"functions": text}, {}, out):
+    for path in page.write("docs/functions.md", {"functions": text}, {}, out):
         click.echo(path)

@@ -743,4 +743,4 @@ def exports_command(laws: int, first: int, write: bool) -> None:
             f"of the stated one {one.found.share:.2f}"
         )
     if write:
-        page.write("export", formats()[0], {}, ROOT)
+        page.write("docs/export.md", formats()[0], {}, ROOT)

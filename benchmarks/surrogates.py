@@ -584,6 +584,6 @@ def surrogates(redraw: bool, out: pathlib.Path) -> None:
     note = f"Not installed, and left out: {', '.join(missing)}.\n\n" if missing else ""
     parts = {"surrogates": note + text_of(rows), "bounds": bounds()}
     figures = {FIGURE: drawn(rows)}
-    for path in page.write("surrogates", parts, figures, out):
+    for path in page.write("docs/surrogates.md", parts, figures, out):
         click.echo(path)
     click.echo(f"{time.perf_counter() - start:.0f} s")

@@ -274,5 +274,5 @@ def table_uses(blocks: tuple[str, ...], out: pathlib.Path) -> None:
     for block in blocks or BLOCKS:
         text = BLOCKS[block]()
         click.echo(text)
-        for path in page.write("functions", {block: text}, {}, out):
+        for path in page.write("docs/functions.md", {block: text}, {}, out):
             click.echo(path)

@@ -42,40 +42,40 @@ COMMANDS = {
     "unloading": "generate.unloading",
 }
 
-# pages of the documentation, by the functions that measure them
-PAGES = {
-    "architecture": "pages.library:architecture",
-    "formula": "pages.library:formula",
-    "readme": "pages.library:readme",
-    "tables": "pages.library:tables",
-    "theories": "pages.library:theories",
-    "howto/trust": "pages.trust:measure",
-    "calibrated": "pages.laws:calibrated",
-    "leakage": "pages.laws:leakage",
-    "adhesion": "pages.adhesion:adhesion",
-    "export": "pages.export:formats",
-    "gallery": "pages.maps:gallery",
-    "machined": "pages.maps:machined",
-    "maps": "pages.maps:maps",
-    "measured": "pages.measurements:measurements",
-    "metals": "pages.measurements:metals",
-    "data": "pages.simulations:data",
-    "fidelity": "pages.simulations:fidelity",
-    "joints": "pages.simulations:joints",
-    "tutorials/design": "pages.simulations:design",
-    "lubrication": "pages.simulations:lubrication",
-    "rough_bodies": "pages.simulations:rough_bodies",
-    "cost": "pages.cost:measure",
-    "guarantees": "pages.stability:measure",
-    "explorer": "explorer:measure",
-    # `yield` is a word of the language
-    "yield": "pages.laws:yielding",
-    "unloading": "pages.unloading:measure",
+# parts of the documentation, by the page that each fills and the function that measures it
+PARTS = {
+    "architecture": ("docs/architecture.md", "pages.library:architecture"),
+    "formula": ("docs/formula.md", "pages.library:formula"),
+    "readme": ("README.md", "pages.library:readme"),
+    "tables": ("docs/tables.md", "pages.library:tables"),
+    "theories": ("docs/theories.md", "pages.library:theories"),
+    "howto/trust": ("docs/howto/trust.md", "pages.trust:measure"),
+    "calibrated": ("docs/fidelity.md", "pages.laws:calibrated"),
+    "constants": ("docs/theories.md", "pages.laws:constants"),
+    "leakage": ("docs/leakage.md", "pages.laws:leakage"),
+    "adhesion": ("docs/adhesion.md", "pages.adhesion:adhesion"),
+    "export": ("docs/export.md", "pages.export:formats"),
+    "gallery": ("docs/gallery.md", "pages.maps:gallery"),
+    "machined": ("docs/fidelity.md", "pages.maps:machined"),
+    "maps": ("docs/maps.md", "pages.maps:maps"),
+    "measured": ("docs/fidelity.md", "pages.measurements:measurements"),
+    "metals": ("docs/metals.md", "pages.measurements:metals"),
+    "data": ("docs/data.md", "pages.simulations:data"),
+    "fidelity": ("docs/fidelity.md", "pages.simulations:fidelity"),
+    "joints": ("docs/joints.md", "pages.simulations:joints"),
+    "tutorials/design": ("docs/tutorials/design.md", "pages.simulations:design"),
+    "lubrication": ("docs/lubrication.md", "pages.simulations:lubrication"),
+    "rough_bodies": ("docs/rough_bodies.md", "pages.simulations:rough_bodies"),
+    "cost": ("docs/cost.md", "pages.cost:measure"),
+    "guarantees": ("docs/guarantees.md", "pages.stability:measure"),
+    "explorer": ("docs/explorer.md", "explorer:measure"),
+    "yield": ("docs/yield.md", "pages.laws:yielding"),
+    "unloading": ("docs/unloading.md", "pages.unloading:measure"),
 }
 
 
 def measured(name: str) -> Measured:
-    module, _, function = PAGES[name].partition(":")
+    module, _, function = PARTS[name][1].partition(":")
     measure = getattr(importlib.import_module(f"generate.{module}"), function)
     parts_and_files: Measured = measure()
     return parts_and_files
@@ -127,7 +127,7 @@ def main() -> None:
 
 
 @main.command()
-@click.argument("names", nargs=-1, required=True, type=click.Choice([*PAGES, "all"]))
+@click.argument("names", nargs=-1, required=True, type=click.Choice([*PARTS, "all"]))
 @click.option(
     "--out",
     type=click.Path(path_type=pathlib.Path, file_okay=False),
@@ -136,8 +136,8 @@ def main() -> None:
 )
 def pages(names: tuple[str, ...], out: pathlib.Path) -> None:
     """Write the measured tables and the figures of pages of the documentation."""
-    for name in PAGES if "all" in names else names:
-        for path in write(name, *measured(name), out):
+    for name in PARTS if "all" in names else names:
+        for path in write(PARTS[name][0], *measured(name), out):
             click.echo(path)
 
 

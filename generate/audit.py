@@ -509,7 +509,7 @@ def audit(seed: int, scale: float, only: str, write: bool) -> None:
         block = f"```\npython -m generate audit --seed {seed} --scale {scale:g} --write\n```\n\n"
         header = "search | answers | refused | beyond | largest"
         write_page(
-            "guarantees",
+            "docs/guarantees.md",
             {"audit": block + table(header, (found[:-1] for found in rows), FORMATS)},
             {},
             ROOT,

@@ -1,9 +1,9 @@
 """Pages of the documentation: hand-written Markdown, with blocks and figures that programs fill.
 
-`PAGES` of `__main__.py` has for each page the function that measures it. It returns the
-text of the blocks between ``<!-- measured: BLOCK -->`` and ``<!-- end -->`` of the page,
-and figures and data by their path in the checkout. ``python -m generate pages NAME``
-writes them.
+`PARTS` of `__main__.py` has for each part the page it fills and the function that measures
+it. The function returns the text of blocks between ``<!-- measured: BLOCK -->`` and
+``<!-- end -->`` of the page, and figures and data by their path in the checkout.
+``python -m generate pages NAME`` writes them.
 """
 
 from __future__ import annotations
@@ -51,13 +51,12 @@ def fill(text: str, parts: Mapping[str, str]) -> str:
 
 
 def write(
-    name: str, parts: Mapping[str, str], files: Mapping[str, Picture], out: pathlib.Path
+    page: str, parts: Mapping[str, str], files: Mapping[str, Picture], out: pathlib.Path
 ) -> list[pathlib.Path]:
     """Write a page and its files, given as bytes or as figures, below a folder.
 
-    Returns their paths.
+    The page is named by its path in the checkout. Returns the paths that were written.
     """
-    page = "README.md" if name == "readme" else f"docs/{name}.md"
     text = (ROOT / page).read_text(encoding="utf-8")
     contents: dict[str, Picture] = {page: fill(text, parts).encode(), **files}
     for place, content in contents.items():

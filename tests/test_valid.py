@@ -2,7 +2,7 @@
 
 The simulations are the boundary elements of docs/data.md that no fit saw. Each kind has its
 own share of errors within two standard deviations; the least is that of docs/fidelity.md,
-docs/yield.md, docs/leakage.md, docs/machined.md and docs/maps.md.
+docs/yield.md, docs/leakage.md, docs/fidelity.md and docs/maps.md.
 """
 
 import csv

@@ -129,7 +129,7 @@ def drawing_of(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]
     if assumed and numbers["process"] != "gaussian":
         maps = f"the {row['maps']} maps of it" if int(row["maps"]) else "any process"
         assumed["skewness and lay"] = (
-            f"are those of {maps} (docs/machined.md): standard deviations of "
+            f"are those of {maps} (docs/fidelity.md): standard deviations of "
             f"{row['area_spread']} of ln area, {row['gap_spread']} of ln gap and "
             f"{row['stiffness_spread']} of ln stiffness"
         )

@@ -1,4 +1,4 @@
-"""Persson's energy integral with cover and weight calibrated on boundary elements; equations in docs/calibrated.md.
+"""Persson's energy integral with cover and weight calibrated on boundary elements; equations in docs/theories.md.
 
 Force is over A0 E* g with g the rms gradient in two dimensions, lengths in h_rms,
 wavenumbers x = q/q0, energy over A0 E* g h_rms. The compiled core, spectrum_laws.c, keeps

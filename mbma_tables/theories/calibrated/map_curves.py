@@ -1,6 +1,6 @@
 """The calibrated law for a height map, by its highest parts at light loads and its valleys near full contact.
 
-Lengths in h_rms, force over A0 E* g as in `calibrated`; docs/calibrated.md has the equations.
+Lengths in h_rms, force over A0 E* g as in `calibrated`; docs/theories.md has the equations.
 """
 
 from __future__ import annotations
