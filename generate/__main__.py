@@ -59,18 +59,18 @@ PARTS = {
     "machined": ("docs/fidelity.md", "pages.maps:machined"),
     "maps": ("docs/maps.md", "pages.maps:maps"),
     "measured": ("docs/fidelity.md", "pages.measurements:measurements"),
-    "metals": ("docs/metals.md", "pages.measurements:metals"),
+    "metals": ("docs/yield.md", "pages.measurements:metals"),
     "data": ("docs/data.md", "pages.simulations:data"),
     "fidelity": ("docs/fidelity.md", "pages.simulations:fidelity"),
     "joints": ("docs/joints.md", "pages.simulations:joints"),
     "tutorials/design": ("docs/tutorials/design.md", "pages.simulations:design"),
-    "lubrication": ("docs/lubrication.md", "pages.simulations:lubrication"),
+    "lubrication": ("docs/leakage.md", "pages.simulations:lubrication"),
     "rough_bodies": ("docs/rough_bodies.md", "pages.simulations:rough_bodies"),
     "cost": ("docs/cost.md", "pages.cost:measure"),
     "guarantees": ("docs/guarantees.md", "pages.stability:measure"),
     "explorer": ("docs/explorer.md", "explorer:measure"),
     "yield": ("docs/yield.md", "pages.laws:yielding"),
-    "unloading": ("docs/unloading.md", "pages.unloading:measure"),
+    "unloading": ("docs/yield.md", "pages.unloading:measure"),
 }
 
 

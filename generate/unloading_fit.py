@@ -174,7 +174,7 @@ def rms(values: Any) -> float:
 
 
 def report(data: pd.DataFrame) -> str:
-    """Constants, scatter, and the table of docs/unloading.md."""
+    """Constants, scatter, and the table of docs/yield.md."""
     rows = ratios(data)
     many = rows[(rows.waves != 2)]
     constants = fitted(many)

@@ -323,7 +323,7 @@ def test_pocket_laws_are_printed_as_they_are_computed():
 
 def test_the_mean_gap_of_a_nominal_one_is_its_integral():
     """Patir and Cheng's h_T is the mean of h + delta where that is positive, delta Gaussian."""
-    text = (ROOT / "docs" / "lubrication.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "leakage.md").read_text(encoding="utf-8")
     (block,) = (
         part.split("```")[0]
         for part in text.split("```python\n")

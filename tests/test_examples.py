@@ -1,4 +1,4 @@
-"""The examples run, draw, print what docs/examples.md shows, and agree with other ways of computing their numbers."""
+"""The examples run, draw, print what pages of docs show, and agree with other ways of computing their numbers."""
 
 import importlib.util
 import pathlib
@@ -19,8 +19,7 @@ pytest.importorskip("matplotlib")
 ROOT = pathlib.Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"
 PAGES = "".join(
-    (ROOT / "docs" / name).read_text(encoding="utf-8")
-    for name in ("examples.md", "lookup.md")
+    path.read_text(encoding="utf-8") for path in sorted((ROOT / "docs").glob("*.md"))
 )
 NEEDS = {"scatter": "dask", "heat": "skfem", "newton": "skfem"}
 

@@ -229,7 +229,7 @@ def film_rows() -> FloatArray:
 
 @click.command()
 def film() -> None:
-    """Flow factors against Reynolds' equation on simulated gaps, for docs/lubrication.md: six minutes.
+    """Flow factors against Reynolds' equation on simulated gaps, for docs/leakage.md: six minutes.
 
     No constant of `mbma_tables.contacts.quantities.lay` was fitted to these surfaces.
     """

@@ -1,4 +1,4 @@
-"""Measured tables and the figure of docs/unloading.md."""
+"""Measured tables and the figure of docs/yield.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Surfaces with a lay: flow factors by an effective medium of gaps (docs/lubrication.md), tangential stiffness."""
+"""Surfaces with a lay: flow factors by an effective medium of gaps (docs/leakage.md), tangential stiffness."""
 
 from __future__ import annotations
 

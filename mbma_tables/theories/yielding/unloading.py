@@ -1,4 +1,4 @@
-"""A yielded contact below the largest pressure that it was under: unloading and reloading; docs/unloading.md.
+"""A yielded contact below the largest pressure that it was under: unloading and reloading; docs/yield.md.
 
 p0 is the largest pressure, s = p/p0, K the stiffness at constant contact area, that of
 unloading, and K0, A0, u0 are those at p0. Unloading is elastic, of a surface whose yielded

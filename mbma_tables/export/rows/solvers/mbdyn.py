@@ -139,7 +139,7 @@ mbdyn = RowFormat(
     name="mbdyn",
     program="MBDyn",
     output=(
-        "a [film](lubrication.md#tables-for-other-codes) as parameters: Greenwood-Tripp "
+        "a [film](leakage.md#tables-for-other-codes) as parameters: Greenwood-Tripp "
         "numbers, flow factors, micro-slip stiffness, with the keywords of the element"
     ),
     outside="goes on by its formula",
