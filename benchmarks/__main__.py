@@ -3,7 +3,7 @@
 ``python -m benchmarks`` prints them, ``--write`` puts them into docs/lookup.md too, and
 ``python -m benchmarks joints`` those of joints and tables of designs. One
 core; every ratio is of two processor times taken in turn, the median over the rounds, so
-that what else the machine does falls on both. docs/cost.md has error against time of every
+that what else the machine does falls on both. docs/lookup.md has error against time of every
 island model.
 """
 

@@ -118,7 +118,7 @@ FIRST_USE = (
     "print(time.process_time() - t)"
 )
 HEAD = """\
-# What accuracy costs, measured by python -m generate cost; docs/cost.md says how. Costs are times over that of a
+# What accuracy costs, measured by python -m generate cost; docs/lookup.md says how. Costs are times over that of a
 # fixed piece of work in the same run; the row of island model unit has its seconds.
 """
 
@@ -524,7 +524,7 @@ def replaced(measured: Iterable[Row]) -> bytes:
 def cost(model: str | None, effect: str | None) -> None:
     """Measure tables/cost.csv and tables/distance.csv.
 
-    For `mbma cost`, plans of scenes and docs/cost.md.
+    For `mbma cost`, plans of scenes and docs/lookup.md.
     """
     studies = {"cost": study, "distance": cost_distances.study}
     if model is not None:

@@ -81,7 +81,7 @@ WAYS: tuple[tuple[str, str, str | Theory], ...] = (
 )
 HEAD = """\
 # Distance of theories from boundary elements on held-out surfaces, and processor time, by python -m generate cost;
-# docs/cost.md says how. Distances are root mean squares of ln(theory/simulation), light at 1-10% contact and deep
+# docs/lookup.md says how. Distances are root mean squares of ln(theory/simulation), light at 1-10% contact and deep
 # at 10-97%; reached is the share of simulated loads there that the theory reaches. cost is of one point, once of what
 # is made beforehand for a surface, both over the fixed piece of work of cost.csv.
 """

@@ -169,7 +169,7 @@ def _clocks(opened: Browser, address: str) -> dict[str, list[float]]:
 
 
 def measure() -> Measured:
-    """docs/explorer.md: size and speed of the page, and its picture."""
+    """docs/export.md: size and speed of the page, and its picture."""
     text = explorer_page(
         Surface.named("concrete"),
         13.3,

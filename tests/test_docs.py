@@ -250,7 +250,7 @@ OF_COMMANDS = re.compile(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", ["maps.md", "gallery.md"])
+@pytest.mark.parametrize("page", ["maps.md", "tutorials/map.md"])
 def test_measured_parts_show_what_commands_print_today(page):
     """`python -m generate pages` writes them, and they went stale unnoticed."""
     parts = [part[0] for part in MARKED.finditer(PAGES[page])]

@@ -355,7 +355,7 @@ COLUMNS = (
 HEAD = """\
 # Held-out surfaces of the group elastic on grids of 32 to 1024 points a side, by python -m generate grids.
 # force in A0 E* g, g the rms gradient of the finest grid; area A/A0, corrected for its perimeter; separation in h_rms.
-# seconds of the processor a load; cost: those over the fixed piece of work of docs/cost.md, timed before and after.
+# seconds of the processor a load; cost: those over the fixed piece of work of docs/lookup.md, timed before and after.
 """
 LARGEST = 256  # points a side of measured maps that are kept, from the middle
 

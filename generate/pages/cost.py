@@ -1,4 +1,4 @@
-"""docs/cost.md: error, and deviation from simulation, against time.
+"""docs/lookup.md: error, and deviation from simulation, against time.
 
 As `python -m generate cost` measured them.
 """

@@ -1,4 +1,4 @@
-"""Theories on maps beside boundary elements: docs/gallery.md, docs/maps.md and docs/fidelity.md."""
+"""Theories on maps beside boundary elements: docs/tutorials/map.md, docs/maps.md and docs/fidelity.md."""
 
 from __future__ import annotations
 

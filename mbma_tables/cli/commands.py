@@ -445,7 +445,7 @@ def cost_command(distance: bool, as_json: bool) -> None:
     """Error and time of every method, as measured on held-out surfaces.
 
     Costs are times relative to that of a fixed piece of work; seconds are those of the
-    machine of the measurement. See docs/cost.md. With --distance: root mean squares of
+    machine of the measurement. See docs/lookup.md. With --distance: root mean squares of
     ln(theory/boundary elements), of area at equal force and force at equal separation,
     light at 1-10% contact and deep at 10-97%.
 
