@@ -6,7 +6,8 @@
 enum { BANDS = 64, ROOM = BANDS + MBMA_WAVE_CHUNK, GAPS = 32, MOST_ROOTS = 60 };
 
 #define NO_SLOPE 1e-12  /* share of the squared gradient that the last bands hold at least */
-#define NO_COVER 1e-13  /* share of the surface between two magnifications */
+#define NO_COVER 1e-8   /* share of the surface between two magnifications: the mean gap of
+                         * fewer is a difference of two means that is mostly rounding */
 #define NEAREST 1e-4    /* least distance of A/A0 to the threshold */
 #define REACH 8.0       /* of gaps around their mean, over the rms height above a band */
 #define FULL 1e8        /* F at which contact is full */

@@ -510,3 +510,20 @@ def test_flow_of_many_spectra_is_that_of_the_medium_of_each():
     laws = self_affine_laws(H, zeta)
     by_medium = spectra_flow._flow_of_spectra(laws, alpha, owner, u, area)
     assert np.abs(np.log(by_medium / by_table)).max() < table.error
+
+
+def test_rounding_of_a_contact_does_not_show_in_its_flow():
+    """Where two bands differ, K jumped by 7e-9 with the last bit of the area, for gaps of 1e-13 of it."""
+    first, second = (
+        Surface.from_roughness(
+            Rq=Rq, hurst=hurst, longest=22.0, shortest=4.4, nominal_area=44.0**2
+        )
+        for Rq, hurst in ((0.0651, 0.184), (0.0292, 1.0))
+    )
+    both = first.combined(second)
+    area = np.linspace(0.02, 0.4, 401)
+    u = np.full(area.shape, 0.06)
+    K = flow(both, u, area)
+    for bits in (-9, 7):
+        near = flow(both, u, area * (1 + bits * 2.0**-52))
+        np.testing.assert_allclose(near, K, rtol=1e-12)

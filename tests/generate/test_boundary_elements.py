@@ -1,6 +1,7 @@
 """The boundary-element campaign: its engine against closed forms, its surfaces, its file."""
 
 import dataclasses
+import os
 import pickle
 import subprocess
 import sys
@@ -237,6 +238,7 @@ def test_a_campaign_gives_the_same_bits_however_it_was_run(tmp_path, monkeypatch
     done = subprocess.run(
         [sys.executable, "-c", program, str(tmp_path / "killed")],
         input=pickle.dumps(tasks),
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
         check=False,
         capture_output=True,
     )

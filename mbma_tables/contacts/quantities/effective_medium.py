@@ -30,7 +30,9 @@ NODES = 80
 LOWEST_GAP = 1e-6
 REACH = 8.0
 NO_SLOPE = 1e-12  # share of the squared gradient that the last bands hold at least
-NO_COVER = 1e-13  # share of the surface between two magnifications
+# share of the surface between two magnifications: the mean gap of fewer is a difference of two
+# means that is mostly rounding
+NO_COVER = 1e-8
 NEAREST = 1e-4  # least distance of A/A0 to the threshold
 
 
