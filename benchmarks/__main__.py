@@ -43,6 +43,7 @@ from benchmarks.table_uses import table_uses
 from generate import page
 from generate.files import ROOT
 from mbma_tables import (
+    Adhesion,
     Bodies,
     Joint,
     Surface,
@@ -305,6 +306,40 @@ def calibrated(rng: np.random.Generator) -> None:
         microseconds(taken["law"], HELD_OUT) / spent,
         "x",
     )
+
+
+def attracted(rng: np.random.Generator) -> None:
+    """Contacts at pressures with an attraction between the bodies, over those without."""
+    click.echo("\nContacts with an attraction over elastic ones, by pressure")
+    bodies = Bodies("1 GPa", adhesion=Adhesion("10 mJ/m^2", "10 nm"))
+
+    def face() -> Surface:
+        return Surface(0.8, q0=0.1, q1=1.6, h_rms=0.1, h_max=0.35, unit="um")
+
+    one = face()
+    for loads in (1, 100, SURFACES):
+        pressure = np.sort(rng.uniform(1e-4, 2e-2, loads))
+        asked = functools.partial(contact, pressure=pressure, theory="calibrated")
+        taken = rounds(
+            {
+                "with": lambda asked=asked: asked(one, bodies).area,
+                "without": lambda asked=asked: asked(one, "1 GPa").area,
+                "first with": lambda asked=asked: asked(face(), bodies).area,
+                "first without": lambda asked=asked: asked(face(), "1 GPa").area,
+            },
+            31,
+        )
+        report(
+            f"{loads} loads of one pair of bodies",
+            times_faster(taken, "with", "without"),
+            "x",
+            at_most=2,
+        )
+        report(
+            f"the first {loads} of a new surface",
+            times_faster(taken, "first with", "first without"),
+            "x",
+        )
 
 
 def kernels(rng: np.random.Generator) -> None:
@@ -612,6 +647,7 @@ def main(context: click.Context, write: bool) -> None:
         totals,
         laws,
         calibrated,
+        attracted,
         maps,
         exported,
         scenes,
@@ -647,6 +683,12 @@ def joints_command(write: bool) -> None:
     joints(np.random.default_rng(SEED))
     if write:
         _put("joints", LINES, load)
+
+
+@main.command("adhesion")
+def adhesion_command() -> None:
+    """Time contacts with an attraction beside elastic ones."""
+    attracted(np.random.default_rng(SEED))
 
 
 main.add_command(functions)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import re
 from collections.abc import Callable
 from typing import Any
@@ -168,8 +169,12 @@ def _work(given: Any, units: Units) -> Any:
     """A work in the unit of stresses times that of lengths: numbers as they are, lists by entry."""
     if isinstance(given, list | tuple):
         return [_work(each, units) for each in given]
-    if not isinstance(given, str):
-        return given
+    return _work_of_text(given, units) if isinstance(given, str) else given
+
+
+@functools.lru_cache(maxsize=64)
+def _work_of_text(given: str, units: Units) -> float:
+    """A work in the unit of stresses times that of lengths."""
     match = _WORK.fullmatch(given.replace("\N{MICRO SIGN}", "u"))
     if match is None:
         raise InputError(

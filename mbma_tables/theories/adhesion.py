@@ -13,6 +13,7 @@ that of the elastic theory (`gap_law`, or a simulated map).
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -24,7 +25,8 @@ from mbma_tables.common.arguments import FloatArray, describe_entries, entries_a
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import gap_law
-from mbma_tables.theories.base import Theory, TheoryAnswer, select
+from mbma_tables.theories.attraction import RTOL, AttractionCurve, kept_curve, knots_of
+from mbma_tables.theories.base import PACKAGE, Theory, TheoryAnswer, select
 from mbma_tables.theories.inversion import Indices
 
 # share of the traction in contact that deforms, fitted to simulations by `python -m generate
@@ -47,6 +49,10 @@ LOOKS = 48  # mean gaps at which a contact is looked for
 SMALLEST_GAP = 1e-10  # of them, over h_rms
 FARTHEST = 12.0  # and the largest, likewise, where contact has no end
 PARTING_NODES = 64
+# of a search, in ln u: steps at most; step from which digits double, if it is this share of that before
+# it; step that is rounding
+MOST_STEPS = 60
+SHORT_STEP, SHRUNK, SHORTEST_STEP = 1e-6, 1e-2, 1e-13
 LAPLACIAN = 8 / 3  # mean square of the Laplacian over m4, of isotropic surfaces
 LEAST_SHARE = 1e-3  # of the attraction at zero load, the least net pressure of laws
 NECKING = (
@@ -97,6 +103,36 @@ def _beside_lowest(
     return before, at, after
 
 
+def _beside(looks: FloatArray, ndim: int) -> FloatArray:
+    """Looks on a first axis, with more axes before those of the bodies for loads of `ndim`."""
+    return looks.reshape(len(looks), *(1,) * (ndim - looks.ndim + 1), *looks.shape[1:])
+
+
+def _first_below(net: FloatArray, goal: FloatArray) -> NDArray[np.intp]:
+    """The first look with a net pressure below the goal; their number where there is none."""
+    lowest = np.fmin.accumulate(net)
+    if net.ndim == 1:
+        return np.asarray(np.searchsorted(-lowest, -goal, side="right"))
+    return np.asarray((_beside(lowest, goal.ndim) >= goal).sum(axis=0))
+
+
+def _at_places(looks: FloatArray, place: NDArray[np.intp]) -> FloatArray:
+    """Looks at places on a first axis, of loads on the others."""
+    if looks.ndim == 1:
+        return np.asarray(looks[place])
+    return np.take_along_axis(_beside(looks, place.ndim - 1), place, 0)
+
+
+def _inverse(log_u: FloatArray, pressure: FloatArray, goal: FloatArray) -> FloatArray:
+    """ln u at net pressures by the polynomial through looks on a first axis, by Neville's scheme; NaN where two are the same."""
+    missed = pressure - goal
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for order in range(1, len(missed)):
+            one, other = missed[:-order], missed[order:]
+            log_u = (one * log_u[1:] - other * log_u[:-1]) / (one - other)
+    return np.asarray(log_u[0])
+
+
 class Adhesive(Theory):
     """A theory with an attraction; u is the mean gap, pressures are net ones."""
 
@@ -122,7 +158,7 @@ class Adhesive(Theory):
         adhesion = dataclasses.replace(self.adhesion, work=work, range=reach)
         return Adhesive(self.elastic, adhesion, modulus)
 
-    @property
+    @functools.cached_property
     def _shape(self) -> tuple[int, ...]:
         """That of the numbers of the bodies."""
         adhesion = self.adhesion
@@ -130,7 +166,7 @@ class Adhesive(Theory):
             self.modulus.shape, np.shape(adhesion.work), np.shape(adhesion.range)
         )
 
-    @property
+    @functools.cached_property
     def _traction(self) -> FloatArray:
         """w/rho over E*."""
         return np.asarray(self.adhesion.work / self.adhesion.range / self.modulus)
@@ -139,16 +175,72 @@ class Adhesive(Theory):
         self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
     ) -> FloatArray:
         """Effective less net pressure over E* at mean gaps and areas of the elastic contact."""
+        return np.asarray(
+            self._traction * self._traction_mean(surface, mean_separation, area)
+        )
+
+    def _traction_mean(
+        self, surface: AnySurface, mean_separation: FloatArray, area: FloatArray
+    ) -> FloatArray:
+        """The same over w/rho."""
         share, gap = self.elastic.open_gaps(surface, mean_separation, area)
         shape = self.adhesion.shape
         # gaps are on an axis of their own
         reach = np.asarray(self.adhesion.range)[..., None]
         decay = (share * shape(gap / reach)).sum(axis=-1)
         in_contact = THETA * float(shape(np.zeros(1))[0]) * area
-        return np.asarray(self._traction * (decay + in_contact))
+        return np.asarray(decay + in_contact)
+
+    def _curve(self, surface: AnySurface) -> AttractionCurve | None:
+        """Of one surface and range, the attraction over w/rho as a function of the mean gap; else None."""
+        if surface.shape or np.ndim(self.adhesion.range):
+            return None
+        # maps have straight lines between loads; theories of users may know surfaces, or change
+        own = type(self.elastic).__module__.startswith(PACKAGE)
+        if self.elastic.gaps() is not None or not own:
+            return None
+
+        def make() -> AttractionCurve:
+            low, high = (float(end) for end in self._range_of_gaps(surface))
+            ends = float(surface.h_rms), float(surface.h_max)
+            return AttractionCurve(knots_of(low, high, *ends))
+
+        key = (self.elastic, float(self.adhesion.range), self.adhesion.shape, THETA)
+        return kept_curve(surface, key, make)
+
+    def _mean(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
+        """The same at mean gaps alone."""
+        area = self.elastic.answer(surface, mean_separation).area
+        return self._traction_mean(surface, mean_separation, area)
+
+    def _attraction(
+        self, surface: AnySurface, u: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Effective less net pressure over E*, and its derivative by u, at mean gaps of the full shape."""
+        curve = self._curve(surface)
+        if curve is None:
+            mean, slope = self._stepped(surface, u)
+            return self._traction * mean, self._traction * slope
+        mean, slope = curve.values(u, lambda gap: self._mean(surface, gap))
+        rough = np.isnan(mean)
+        if rough.any():
+            mean[rough], slope[rough] = self._stepped(surface, u[rough])
+        return self._traction * mean, self._traction * slope
+
+    def _stepped(
+        self, surface: AnySurface, u: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Attraction over w/rho and its derivative, by differences."""
+        mean = self._mean(surface, np.stack([u, u * (1 - STEP), u * (1 + STEP)]))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slope = (mean[2] - mean[1]) / (2 * STEP * u)
+        # without a gap there is nothing to differ
+        return mean[0], np.where(u > 0, slope, 0.0)
 
     def net(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
         """Net pressure over E* at mean gaps."""
+        if self._curve(surface) is not None:
+            return self.answer(surface, mean_separation).pressure
         answer = self.elastic.answer(surface, mean_separation)
         return np.asarray(
             answer.pressure - self.pull(surface, mean_separation, answer.area)
@@ -157,17 +249,16 @@ class Adhesive(Theory):
     def answer(self, surface: AnySurface, mean_separation: FloatArray) -> TheoryAnswer:
         """Net pressure, area and -dp/du at mean separations u [length]."""
         u = np.asarray(mean_separation, dtype=float)
-        u = np.broadcast_to(u, np.broadcast_shapes(u.shape, self._shape))
-        steps = np.stack([u, u * (1 - STEP), u * (1 + STEP)])
-        elastic = self.elastic.answer(surface, steps)
-        pull = self.pull(surface, steps, elastic.area)
-        pressure, area, stiffness, error = (field[0] for field in elastic)
+        if surface.shape or self._shape:
+            shape = np.broadcast_shapes(u.shape, self._shape, surface.shape)
+            u = np.broadcast_to(u, shape)
+        pressure, area, stiffness, error = self.elastic.answer(surface, u)
+        pull, slope = self._attraction(surface, u)
+        net = pressure - pull
         with np.errstate(divide="ignore", invalid="ignore"):
-            steep = stiffness + (pull[2] - pull[1]) / (2 * STEP * u)
-            net = pressure - pull[0]
             # errors of the elastic force pass on to the net one, which may vanish
-            passed_on = error * (pressure + pull[0]) / np.abs(net)
-        return TheoryAnswer(net, area, np.where(u > 0, steep, stiffness), passed_on)
+            passed_on = (error * (pressure + pull) + RTOL * pull) / np.abs(net)
+        return TheoryAnswer(net, area, stiffness + slope, passed_on)
 
     def _range_of_gaps(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
         """Mean gaps between which contacts at pressures are looked for."""
@@ -179,12 +270,25 @@ class Adhesive(Theory):
         return np.maximum(low, SMALLEST_GAP * h_rms), np.minimum(farthest, high)
 
     def _looked_at(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
-        """Mean gaps on a first axis, rising, of surfaces and moduli, and net pressures there."""
-        low, high = self._range_of_gaps(surface)
+        """ln u on a first axis, rising, of surfaces and bodies, and net pressures there."""
         shape = np.broadcast_shapes(surface.shape, self._shape)
+        curve = self._curve(surface)
+        if curve is not None:
+            force, attraction = curve.at_knots(lambda gap: self._at_knots(surface, gap))
+            column = (-1, *(1,) * len(shape))
+            net = force.reshape(column) - self._traction * attraction.reshape(column)
+            return curve.log_knots.reshape(column), net
+        low, high = self._range_of_gaps(surface)
         share = np.linspace(0.0, 1.0, LOOKS).reshape(-1, *(1,) * len(shape))
         u = np.broadcast_to(low * (high / low) ** share, (LOOKS, *shape))
-        return u, self.net(surface, u)
+        return np.log(u), self.net(surface, u)
+
+    def _at_knots(
+        self, surface: AnySurface, u: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Elastic pressure over E* and attraction over w/rho at mean gaps."""
+        answer = self.elastic.answer(surface, u)
+        return answer.pressure, self._traction_mean(surface, u, answer.area)
 
     def pull_off(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
         """Tension over E* at which the bodies part, at least 0, and the mean gap there [length].
@@ -194,7 +298,8 @@ class Adhesive(Theory):
         # scipy's optimizers take as long to import as a first contact takes without them
         from scipy.optimize.elementwise import find_minimum
 
-        u, net = self._looked_at(surface)
+        log_u, net = self._looked_at(surface)
+        u = np.broadcast_to(np.exp(log_u), net.shape)
         # twice, as the first look reaches over many decades
         low, _, high = _beside_lowest(u, net)
         share = np.linspace(0.0, 1.0, LOOKS).reshape(-1, *(1,) * low.ndim)
@@ -248,28 +353,26 @@ class Adhesive(Theory):
                 surface, quantity, wanted
             )
             return found
-        u, net = self._looked_at(surface)
-        shape = np.broadcast_shapes(np.shape(wanted), net.shape[1:])
-        goal = np.broadcast_to(wanted, shape)
-        every = (-1, *(1,) * (goal.ndim - net.ndim + 1), *net.shape[1:])
-        looks, net = (
-            np.broadcast_to(each.reshape(every), (LOOKS, *shape)) for each in (u, net)
+        looks, net = self._looked_at(surface)
+        goal = np.broadcast_to(
+            wanted, np.broadcast_shapes(np.shape(wanted), net.shape[1:])
         )
-        below = net < goal
-        if below[0].any():
-            self._refuse_closed(goal, below[0])
-        first = below.argmax(axis=0)
-        low = np.take_along_axis(looks, np.maximum(first - 1, 0)[None], 0)[0]
-        high = np.take_along_axis(looks, first[None], 0)[0]
-        reached = np.asarray(below.any(axis=0))
+        first = _first_below(net, goal)
+        if not first.all():
+            self._refuse_closed(goal, first == 0)
+        steps = np.arange(-2, 2).reshape(-1, *(1,) * goal.ndim)
+        place = np.clip(first + steps, 0, len(net) - 1)
+        log_u, pressure = (_at_places(each, place) for each in (looks, net))
+        low, high = log_u[1], log_u[2]
+        reached = first < len(net)
         if not reached.all():
             # between the looks beside pull-off
-            parting = np.broadcast_to(self._parting(surface, goal, reached), shape)
-            before = np.clip((looks < parting).sum(axis=0) - 1, 0, LOOKS - 1)
-            nearest = np.take_along_axis(looks, before[None], 0)[0]
+            parting = np.log(self._parting(surface, goal, reached))
+            before = (_beside(looks, goal.ndim) < parting).sum(axis=0) - 1
+            nearest = _at_places(looks, np.maximum(before, 0)[None])[0]
             low, high = np.where(reached, low, nearest), np.where(reached, high, parting)
-        root = self._between(surface, goal, np.log(low), np.log(high))
-        return root, np.zeros(shape, bool)
+        start = _inverse(log_u, pressure, goal)
+        return self._between(surface, goal, low, high, start), np.zeros(goal.shape, bool)
 
     def _parting(
         self, surface: AnySurface, goal: FloatArray, reached: NDArray[np.bool_]
@@ -296,19 +399,33 @@ class Adhesive(Theory):
         )
 
     def _between(
-        self, surface: AnySurface, goal: FloatArray, low: FloatArray, high: FloatArray
+        self,
+        surface: AnySurface,
+        goal: FloatArray,
+        low: FloatArray,
+        high: FloatArray,
+        start: FloatArray,
     ) -> FloatArray:
-        """Mean gap at a net pressure, between logarithms of gaps."""
-        from scipy.optimize.elementwise import find_root
-
-        net_at, place = self._of_entries(surface, goal.shape)
-
-        def missed(log_u: FloatArray, wanted: FloatArray, at: FloatArray) -> FloatArray:
-            return net_at(log_u, at) - wanted
-
-        found = find_root(missed, (low, high), args=(goal, place))
-        # pull-off itself is within rounding of the end of its bracket
-        return np.exp(np.where(found.success, found.x, high))
+        """Mean gap at a net pressure, between logarithms of gaps, by Newton's method."""
+        middle = (low + high) / 2
+        x = np.where((start > low) & (start < high), start, middle)
+        step = high - low
+        for _ in range(MOST_STEPS):
+            u = np.exp(x)
+            answer = self.answer(surface, u)
+            missed = answer.pressure - goal
+            low, high = np.where(missed >= 0, x, low), np.where(missed >= 0, high, x)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                nearer = x + missed / (answer.stiffness * u)
+            inside = (nearer >= low) & (nearer <= high)
+            nearer = np.where(inside, nearer, (low + high) / 2)
+            before, step = step, np.abs(nearer - x)
+            x = nearer
+            # digits double with each step, but beside pull-off
+            doubles = inside & (step < SHORT_STEP) & (step < SHRUNK * before)
+            if (doubles | (step < SHORTEST_STEP)).all():
+                break
+        return np.exp(x)
 
     def interval(
         self, surface: AnySurface, quantity: str = "pressure"

@@ -28,7 +28,9 @@ from mbma_tables import (
 from mbma_tables.common.errors import InputError, MissingError, OutOfRangeError
 from mbma_tables.common.units import Units
 from mbma_tables.contacts.sticking import sticking
+from mbma_tables.theories import gap_law
 from mbma_tables.theories.adhesion import MOST_TABOR, THETA
+from mbma_tables.theories.gap_law import open_gaps
 from mbma_tables.theories.simulated.adhesive import AdhesiveContact
 
 FACE = Surface(hurst=0.8, q0=0.1, q1=1.6, h_rms=0.1, h_max=0.35, unit="um")
@@ -78,6 +80,48 @@ def test_pressures_are_found_on_the_closest_contact():
     assert (found.mean_separation[0] < plain.mean_separation).all()
     by_area = pressed(STICKY, area=found.area[0])
     assert by_area.pressure == pytest.approx(loads[0], rel=1e-6)
+
+
+def test_more_contacts_of_a_pair_of_bodies_need_no_more_gaps(monkeypatch):
+    """The mean over gaps, a hundred times an elastic contact, is that of a few contacts for any number of loads."""
+    rows = []
+
+    def counted(u, *arguments):
+        rows.append(np.size(u))
+        return open_gaps(u, *arguments)
+
+    monkeypatch.setattr(gap_law, "open_gaps", counted)
+    loads = np.geomspace(1e-4, 0.02, 2000)
+    face = dataclasses.replace(FACE)
+    first = contact(face, STICKY, pressure=loads, theory="calibrated")
+    assert sum(rows) < loads.size
+    rows.clear()
+    again = contact(face, STICKY, pressure=1.01 * loads[:-1], theory="calibrated")
+    other = contact(face, adhesive(4e-6, 0.01), pressure=0.005, theory="calibrated")
+    assert not rows
+    monkeypatch.undo()
+    for found in (first, again, other):
+        # the net pressure by the gaps of an elastic contact
+        elastic = contact(face, "1 GPa", mean_separation=found.mean_separation, theory="calibrated")  # fmt: skip
+        near = elastic.gap_mean(lambda gap: np.exp(-gap / 0.01)) + THETA * elastic.area
+        strength = 4e-4 if found is other else 1e-3
+        expected = elastic.pressure - strength * near
+        assert found.pressure == pytest.approx(expected, rel=1e-8)
+
+
+def test_the_attraction_is_the_mean_over_gaps_beside_every_bend():
+    """Bodies that nearly touch, that are apart, and gaps of a few wavelengths of light."""
+    u = [1e-9, 1e-4, 0.33, 0.345, 0.3499999, 0.35, 0.350001, 0.4, 1.1, 3.0]
+    for reach in (0.002, 0.01, 1.0):
+        bodies = adhesive(1e-5, reach)
+        found = pressed(bodies, mean_separation=u)
+        share, gap = open_gaps(u, found.area, FACE.alpha, 0.1)
+        near = (share * np.exp(-gap / reach)).sum(axis=-1) + THETA * found.area
+        np.testing.assert_allclose(found.attraction, 1e-5 / reach * near, rtol=1e-8)
+        elastic = pressed("1 GPa", mean_separation=u)
+        np.testing.assert_allclose(
+            found.pressure, elastic.pressure - 1e-5 / reach * near, rtol=1e-7, atol=1e-25
+        )
 
 
 def test_pull_off_is_the_largest_tension_of_any_gap():
