@@ -3,7 +3,7 @@
 ``python -m benchmarks surrogates`` fits all of them to the exact islands of the shipped
 four-number table, on its axes and in its logarithms of Phi over that of a rigid sphere, and
 compares them at random islands that none has seen. It writes the table and the figure of
-docs/surrogates.md. What is not installed is left out, and named.
+docs/tables.md. What is not installed is left out, and named.
 """
 
 import dataclasses
@@ -539,7 +539,7 @@ def label(
 
 def measured_before() -> list[dict[str, Any]]:
     """What the figure shows, from the table of the page."""
-    text = (ROOT / "docs/surrogates.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/tables.md").read_text(encoding="utf-8")
     blocks = {match[2]: match[0] for match in page.MARKED.finditer(text)}
     lines = [line for line in blocks["surrogates"].splitlines() if line.startswith("|")]
     header, _, *cells = (line.strip("| ").split(" | ") for line in lines)
@@ -563,10 +563,10 @@ def measured_before() -> list[dict[str, Any]]:
     "--out",
     type=click.Path(path_type=pathlib.Path),
     default=ROOT,
-    help="Folder below which docs/surrogates.md and its figure are written.",
+    help="Folder below which docs/tables.md and its figure are written.",
 )
 def surrogates(redraw: bool, out: pathlib.Path) -> None:
-    """Measure surrogates of contact islands, and write docs/surrogates.md (ten minutes)."""
+    """Measure surrogates of contact islands, and write docs/tables.md (ten minutes)."""
     if redraw:
         write_file(out / FIGURE, page.svg(drawn(measured_before())), make_folders=True)
         click.echo(out / FIGURE)
@@ -584,6 +584,6 @@ def surrogates(redraw: bool, out: pathlib.Path) -> None:
     note = f"Not installed, and left out: {', '.join(missing)}.\n\n" if missing else ""
     parts = {"surrogates": note + text_of(rows), "bounds": bounds()}
     figures = {FIGURE: drawn(rows)}
-    for path in page.write("docs/surrogates.md", parts, figures, out):
+    for path in page.write("docs/tables.md", parts, figures, out):
         click.echo(path)
     click.echo(f"{time.perf_counter() - start:.0f} s")

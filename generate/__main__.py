@@ -65,7 +65,7 @@ PARTS = {
     "joints": ("docs/joints.md", "pages.simulations:joints"),
     "tutorials/design": ("docs/tutorials/design.md", "pages.simulations:design"),
     "lubrication": ("docs/leakage.md", "pages.simulations:lubrication"),
-    "rough_bodies": ("docs/rough_bodies.md", "pages.simulations:rough_bodies"),
+    "rough_bodies": ("docs/joints.md", "pages.simulations:rough_bodies"),
     "cost": ("docs/lookup.md", "pages.cost:measure"),
     "guarantees": ("docs/guarantees.md", "pages.stability:measure"),
     "explorer": ("docs/export.md", "explorer:measure"),

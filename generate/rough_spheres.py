@@ -54,7 +54,7 @@ def simulated(z: FloatArray) -> Iterator[tuple[float, ...]]:
 
 @click.command()
 def rough_spheres() -> None:
-    """Press rough spheres on a flat, for docs/rough_bodies.md: two minutes."""
+    """Press rough spheres on a flat, for docs/joints.md: two minutes."""
     rows = []
     for seed, design in enumerate(
         itertools.product(HURSTS, LONGEST, HEIGHTS, range(EACH)), FIRST_SEED

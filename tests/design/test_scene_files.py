@@ -152,7 +152,7 @@ def test_examples_are_scenes_and_the_schema_names_what_the_code_knows():
 
 
 def test_the_files_of_the_page_are_scenes(tmp_path):
-    page = (EXAMPLES.parent / "docs" / "scenes.md").read_text(encoding="utf-8")
+    page = (EXAMPLES.parent / "docs" / "lookup.md").read_text(encoding="utf-8")
     whole, bodies = (block.split("```")[0] for block in page.split("```toml\n")[1:])
     found = Scene.from_toml(write(tmp_path, whole)).run()
     assert found["solid_conductance"].attrs["units"] == "W/(m^2 K)"

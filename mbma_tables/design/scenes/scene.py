@@ -375,7 +375,7 @@ class Scene:
 
     @classmethod
     def from_toml(cls, path: os.PathLike[str] | str) -> Scene:
-        """The scene of a TOML file, see docs/scenes.md and `scene.schema.json`.
+        """The scene of a TOML file, see docs/lookup.md and `scene.schema.json`.
 
         Raises
         ------
