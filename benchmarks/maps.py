@@ -1,13 +1,16 @@
 """Simulated maps, each in a process of its own, and bearing tables, each of a new surface.
 
-`python -m benchmarks.maps 256 512` prints the rows of maps of these numbers of points a side.
+`python -m benchmarks.maps 256 512` prints the rows of maps of these numbers of points a side, and
+`python -m benchmarks.maps --file 8192` those of a map in a file that is not loaded as a whole.
 """
 
 import json
 import os
+import pathlib
 import resource
 import subprocess
 import sys
+import tempfile
 import time
 import timeit
 
@@ -26,6 +29,7 @@ FULL = Simulated(grid="full")
 # bars of a map of so many points a side, by seconds of the clock on two cores that nothing else
 # uses, flow included
 MOST = {256: 2.0, 512: 10.0, 1024: 60.0}
+TILE = 1024  # points a side of the periodic map that fills a file
 STEPS = 32  # of four longest wavelengths along a side, eight along the shortest one
 
 
@@ -47,11 +51,51 @@ def one_map(points: int, periodic: bool, grid: str, flow: bool) -> None:
     print(json.dumps([*taken, memory]))
 
 
+def one_file(path: str) -> None:
+    """Ask about the contact of a map in a file: seconds and memory after it is read, and in the end."""
+    clock, cpu = time.monotonic(), time.process_time()
+    numbers = []
+
+    def note() -> None:
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        numbers.extend([time.monotonic() - clock, time.process_time() - cpu, memory])
+
+    surface = Surface.from_map(path, 1.0, periodic=False, confirmed="bow")
+    note()
+    contact(surface, area=0.1)
+    note()
+    print(json.dumps(numbers))
+
+
+def from_file(points: int) -> None:
+    """Rows of a map of that many points a side in a .npy file of 8 bytes a point."""
+    tile = rough(TILE)
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / "map.npy"
+        whole = np.lib.format.open_memmap(path, "w+", "<f8", (points, points))
+        for first in range(0, points, TILE):
+            rows = whole[first : first + TILE]
+            rows[:] = np.tile(tile, (1, points // TILE + 1))[: len(rows), :points]
+        whole.flush()
+        del whole
+        numbers = _cold("--one-file", str(path))
+        size = path.stat().st_size / 1e6
+    name = f"{points} x {points}, a file of {size:.0f} MB"
+    for what, first in (("read", 0), ("read, quick grid", 3)):
+        report(f"{name}: {what}", numbers[first], "s")
+        report("  of the processor", numbers[first + 1], "s")
+        report("  memory of the process", numbers[first + 2], "MB")
+
+
 def of_cold_process(points: int, periodic: bool, grid: str, flow: bool) -> list[float]:
     """Seconds of the clock and of the processor, and MB, of a process that has no cache."""
-    case = json.dumps([points, periodic, grid, flow])
+    return _cold("--one", json.dumps([points, periodic, grid, flow]))
+
+
+def _cold(*arguments: str) -> list[float]:
+    """The numbers that such a process of this module prints."""
     done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.maps", "--one", case],
+        [sys.executable, "-m", "benchmarks.maps", *arguments],
         check=True,
         capture_output=True,
         text=True,
@@ -103,5 +147,10 @@ def maps(rng: np.random.Generator) -> None:
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--one"]:
         one_map(*json.loads(sys.argv[2]))
+    elif sys.argv[1:2] == ["--one-file"]:
+        one_file(sys.argv[2])
+    elif sys.argv[1:2] == ["--file"]:
+        for text in sys.argv[2:] or ("8192",):
+            from_file(int(text))
     else:
         simulated(tuple(int(text) for text in sys.argv[1:]) or (256, 512))

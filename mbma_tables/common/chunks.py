@@ -93,7 +93,7 @@ def _answers(
                     some = waiting.popleft()
                     running.append((some, pool.submit(make, some)))
                 some, answer = running.popleft()
-                doing(f"{some.start:,} of {count:,} {what}")
+                doing(f"{some.start:,} of {count:,} {what}", some.start / count)
                 yield some, _result(answer)
     finally:
         pool.shutdown(wait=False, cancel_futures=True)

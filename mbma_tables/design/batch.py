@@ -729,7 +729,7 @@ def _written(
             rows += counts.rows
             refused += counts.refused
             not_valid += counts.not_valid
-            doing(f"{rows:,} rows, {share:.0%} of the table")
+            doing(f"{rows:,} rows, {share:.0%} of the table", share)
     return Summary(rows, refused, not_valid)
 
 

@@ -258,7 +258,7 @@ def _one_by_one(
     """The draws one after the other, where their contacts make no batch."""
     with shown("draws"):
         for k, pressures in enumerate(loads):
-            doing(f"draw {k + 1} of {len(loads)}")
+            doing(f"draw {k + 1} of {len(loads)}", k / len(loads))
             one = {name: entries[k][0] for name, entries in typed.items()}
             pressed = description.make(one)(pressures)
             yield _of_contact(pressed, names, (1, len(pressures)))

@@ -12,6 +12,7 @@ from mbma_tables.common.arguments import FloatArray, nearest, number_in, require
 from mbma_tables.common.errors import InputError, NotSelfAffineError, OutOfRangeError
 from mbma_tables.common.units import Units, factor, in_one_unit, known
 from mbma_tables.surfaces import bearing_curve as bearing
+from mbma_tables.surfaces.blocks import is_large, mapped, read_by_blocks
 from mbma_tables.surfaces.heights import Heights
 from mbma_tables.surfaces.measurements import grid_of, read_measurement
 from mbma_tables.surfaces.profiles import measured_profiles
@@ -27,6 +28,7 @@ from mbma_tables.surfaces.treatment import (
     mirrored,
     squares,
     treat,
+    treat_further,
     within,
 )
 
@@ -95,11 +97,16 @@ def prepared(
     channel = stated.pop("channel", None)
     periodic = stated.pop("periodic", None)
     if isinstance(source, str | os.PathLike):
-        source = read_measurement(source, **lengths, unit=unit, channel=channel)
-        lengths = {}
+        large = mapped(source) if channel in (None, 0) else None
+        if large is None:
+            source = read_measurement(source, **lengths, unit=unit, channel=channel)
+            lengths = {}
+        else:
+            source = large
     elif channel is not None:
         raise InputError("channel belongs to a file")
-    dimensions = source.dim if dimensions is None else dimensions
+    if dimensions is None:
+        dimensions = 2 if is_large(source) else source.dim
     grid, steps, whole, unit_of_source = grid_of(
         source, lengths.get("dx"), lengths.get("dy"), periodic, dimensions
     )
@@ -114,7 +121,11 @@ def prepared(
     units = Units(unit_of_heights)
     for name in stated.keys() & {*CALLED, "outliers"}:
         stated[name] = units.number(name, stated[name])
-    return treat(grid, steps, whole, Treatment(**stated), unit_of_heights)
+    treatment = Treatment(**stated)
+    if dimensions == 2 and is_large(grid):
+        read = read_by_blocks(grid, steps, whole, treatment, unit_of_heights)
+        return treat_further(read, treatment)
+    return treat(grid, steps, whole, treatment, unit_of_heights)
 
 
 def points_of_fit(surface: SpectralSurface) -> dict[str, Any]:

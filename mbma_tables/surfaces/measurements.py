@@ -6,6 +6,7 @@ Most formats are read by SurfaceTopography (the extra `maps`).
 import contextlib
 import io
 import itertools
+import math
 import os
 import pathlib
 import re
@@ -97,6 +98,7 @@ def read_measurement(
                     )
                 named = _units_of_header(start)
                 stream.seek(0)
+                _refuse_cut_short(stream, place.name)
                 plain = _without_mark(stream)
                 _refuse_mixed_marks(plain, place.name)
                 with module.open_topography(plain) as reader:
@@ -125,6 +127,32 @@ def read_measurement(
         raise InputError(
             f"SurfaceTopography cannot read {os.fspath(path)!r} as a map: {why}"
         )
+
+
+def _refuse_cut_short(stream: Any, name: str) -> None:
+    """Raise an error for an array of numpy that ends too early; its reader makes up the rest."""
+    wanted = found = 0
+    if stream.read(len(np.lib.format.MAGIC_PREFIX)) == np.lib.format.MAGIC_PREFIX:
+        stream.seek(0)
+        # a fault in the header is the reader's to judge
+        with contextlib.suppress(ValueError):
+            wanted = _bytes_of_array(stream)
+        found = -stream.tell() + stream.seek(0, io.SEEK_END)
+    stream.seek(0)
+    if found < wanted:
+        raise InputError(
+            f"{name} is cut short: its header names {wanted} bytes of heights, and it holds "
+            f"{found}"
+        )
+
+
+def _bytes_of_array(stream: Any) -> int:
+    """Bytes behind the header of an array of numpy, which is read."""
+    layout = np.lib.format
+    major, _ = layout.read_magic(stream)
+    header = layout.read_array_header_1_0 if major == 1 else layout.read_array_header_2_0
+    shape, _, kind = header(stream)
+    return math.prod(shape) * kind.itemsize
 
 
 def _refuse_mixed_marks(stream: Any, name: str) -> None:
@@ -562,6 +590,14 @@ def _refuse_gaps(scan: Any) -> None:
 
 def heights_of(grid: Any, dimensions: int = 2) -> Any:
     """Heights as a masked array of floats, NaN being undefined; infinite ones are errors."""
+    heights = defined_or_masked(grid, dimensions)
+    if np.ma.getmaskarray(heights).all():
+        raise InputError("every height is undefined")
+    return heights
+
+
+def defined_or_masked(grid: Any, dimensions: int = 2) -> Any:
+    """The same of heights that may all be undefined, as in a part of a map."""
     try:
         values = np.ma.asanyarray(grid)
     except (TypeError, ValueError) as fault:
@@ -575,12 +611,10 @@ def heights_of(grid: Any, dimensions: int = 2) -> Any:
         raise InputError(f"heights must be real numbers: entries of type {values.dtype}")
     numbers = np.ma.getdata(values).astype(float)
     holes = np.ma.getmaskarray(values) | np.isnan(numbers)
-    if holes.all():
-        raise InputError("every height is undefined")
-    defined = finite_array("heights", numbers[~holes])
-    require(
-        "heights", defined, np.abs(defined) <= MAX_LENGTH, "at most 1e30 in magnitude"
-    )
+    if not holes.all():
+        defined = finite_array("heights", numbers[~holes])
+        allowed = "at most 1e30 in magnitude"
+        require("heights", defined, np.abs(defined) <= MAX_LENGTH, allowed)
     return np.ma.masked_array(numbers, holes)
 
 

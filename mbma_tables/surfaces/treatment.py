@@ -158,10 +158,10 @@ class Treatment:
                 raise InputError(
                     f"{name} must be one of {', '.join(allowed)}, got {getattr(self, name)!r}"
                 )
-        object.__setattr__(self, "confirmed", _names_of(self.confirmed))
+        object.__setattr__(self, "confirmed", names_of(self.confirmed))
 
 
-def _names_of(confirmed: Any) -> tuple[str, ...]:
+def names_of(confirmed: Any) -> tuple[str, ...]:
     """The names of `Treatment.confirmed`, an InputError for others."""
     if confirmed is None:
         return ()
@@ -284,20 +284,27 @@ def treat(
 ) -> Treated:
     """Heights [length] made ready for their spectrum; NaN and masked points are undefined."""
     heights = heights_of(grid, len(steps))
+    confirmed = names_of(treatment.confirmed)
+    return treat_further(
+        Treated(heights, steps, periodic, unit, confirmed=confirmed), treatment
+    )
+
+
+def treat_further(treated: Treated, treatment: Treatment) -> Treated:
+    """Heights after the steps of a treatment, as they are read."""
+    heights = treated.heights
     if min(heights.shape) < MIN_GRID:
         points = _by(heights.shape)
         least = _by((MIN_GRID,) * heights.ndim)
         raise InputError(
             f"{points} points have too few wavelengths; needed are at least {least}"
         )
-    confirmed = _names_of(treatment.confirmed)
-    treated = Treated(heights, steps, periodic, unit, confirmed=confirmed)
     for found in artefacts.as_read(heights) if heights.ndim == 2 else ():
         treated = treated.with_artefact(found)
     with warnings.catch_warnings():
         # warnings of numpy inside that library are ignored
         warnings.simplefilter("ignore")
-        treated = _filled(_without_outliers(treated, treatment.outliers), treatment.fill)
+        treated = _filled(without_outliers(treated, treatment.outliers), treatment.fill)
         treated = _without_seams(treated)
         treated = _without_sharp_places(treated, heights)
         treated = _flattened(treated, treatment.detrend)
@@ -371,7 +378,7 @@ def _harmonic(treated: Treated) -> FloatArray:
     return np.asarray(np.ma.getdata(heights), float)
 
 
-def _without_outliers(treated: Treated, requested_limit: float | None) -> Treated:
+def without_outliers(treated: Treated, requested_limit: float | None) -> Treated:
     """Heights with outliers undefined; if not requested, a few outliers are only reported."""
     from scipy.ndimage import median_filter
 

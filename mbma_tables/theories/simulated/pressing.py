@@ -174,9 +174,9 @@ class Press:
         found: dict[float, FloatArray] = {}
 
         def add(load: float) -> None:
-            doing(
-                f"boundary elements {_bar(len(found), max(len(wanted), len(found) + 1))}"
-            )
+            number = max(len(wanted), len(found) + 1)
+            done = len(found)
+            doing(f"boundary elements {_bar(done, number)}", done / number)
             found[load] = self(load)[0]
 
         with shown("boundary elements"):
@@ -232,7 +232,8 @@ class Press:
 
         def add(loads: list[float]) -> None:
             number = max(x.size // 2 + FLOWS // 2, len(found) + len(loads))
-            doing(f"flow through the gaps {_bar(len(found), number)}")
+            done = len(found)
+            doing(f"flow through the gaps {_bar(done, number)}", done / number)
             forces = [float(np.exp(own)) for own in loads]
             # gaps first: the engine goes from load to load
             for force in forces:
