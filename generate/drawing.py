@@ -1,5 +1,6 @@
 """``python -m generate drawing``: how far faces of a process are from what their Ra tells, and the coverage of bands."""
 
+import contextlib
 import csv
 import io
 import pathlib
@@ -16,6 +17,7 @@ from generate.machined.makers import Part
 from mbma_tables import Surface, contact, uncertainty
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file
+from mbma_tables.surfaces.roughness import processes
 
 FILE = pathlib.Path("tables/processes.csv")
 SPREADS = {"area": "area", "gap": "mean_separation", "stiffness": "stiffness"}
@@ -137,32 +139,64 @@ def with_spreads(text: str, found: dict[str, dict[str, float]]) -> str:
     return "\n".join([*head, body.getvalue()])
 
 
+@contextlib.contextmanager
+def with_other_spreads(found: dict[str, dict[str, float]]) -> Iterator[None]:
+    """Bands by these spreads in place of those of the shipped file."""
+    rows = processes()
+    shipped = {name: dict(row) for name, row in rows.items()}
+    for name, row in rows.items():
+        own = found.get(name, found[""])
+        row |= {f"{kind}_spread": f"{own[kind]:.3f}" for kind in SPREADS}
+    try:
+        yield
+    finally:
+        rows |= shipped
+
+
+def coverage(maps: list[Reduced], Ra: float, held_out: bool) -> list[dict[str, float]]:
+    """What `covered` finds of each map, by spreads of all maps or of the half that it is not in."""
+    if not held_out:
+        return [covered(one, Ra) for one in tqdm(maps, disable=None)]
+    shares: dict[int, dict[str, float]] = {}
+    for half in (0, 1):
+        with with_other_spreads(spreads(maps[1 - half :: 2])):
+            for place in tqdm(range(half, len(maps), 2), disable=None):
+                shares[place] = covered(maps[place], Ra)
+    return [shares[place] for place in range(len(maps))]
+
+
 @click.command()
 @click.option("--write/--no-write", default=True, help="Write tables/processes.csv.")
-def drawing(write: bool) -> None:
-    """Compare simulated machined maps with what Ra and the process tell: five minutes."""
+@click.option(
+    "--held-out",
+    is_flag=True,
+    help="Count each map by the spreads of the half of the maps that it is not in.",
+)
+def drawing(write: bool, held_out: bool) -> None:
+    """Compare simulated machined maps with what Ra and the process tell: five minutes.
+
+    Prints a table of the shares of their contacts in the 95% band of Ra and process: of
+    area, gap and stiffness, by Ra and process.
+    """
     maps = list(reduced())
     if write:
         text = with_spreads(FILE.read_text(encoding="utf-8"), spreads(maps))
         write_file(FILE, text.encode())
-    click.echo(
-        "shares of maps in the 95% band of Ra and process, by Ra [um] and quantity"
-    )
-    families = [*dict.fromkeys(one.family for one in maps)]
-    for Ra in HEIGHTS:
-        shares = [covered(one, Ra) for one in tqdm(maps, disable=None)]
-        all_maps = [
-            f"{np.mean([each[name] for each in shares]):.2f}" for name in SPREADS.values()
+    families = np.array([one.family for one in maps])
+    click.echo(f"| process (maps) | {' | '.join(f'{Ra:g} um' for Ra in HEIGHTS)} |")
+    click.echo(f"| --- | {' | '.join('---' for _ in HEIGHTS)} |")
+    shares = np.array(
+        [
+            [
+                [one[name] for name in SPREADS.values()]
+                for one in coverage(maps, Ra, held_out)
+            ]
+            for Ra in HEIGHTS
         ]
-        click.echo(f"{Ra} um, all: {' '.join(all_maps)}")
-        for family in families:
-            own = [
-                each
-                for each, one in zip(shares, maps, strict=True)
-                if one.family == family
-            ]
-            row = [
-                f"{np.mean([each[name] for each in own]):.2f}"
-                for name in SPREADS.values()
-            ]
-            click.echo(f"{Ra} um, {family}: {' '.join(row)}")
+    )
+    for family in ("all", *dict.fromkeys(families)):
+        own = shares[:, (families == family) | (family == "all")]
+        cells = [
+            ", ".join(f"{100 * share:.0f}" for share in row) for row in own.mean(axis=1)
+        ]
+        click.echo(f"| {family} ({own.shape[1]}) | {' | '.join(cells)} |")

@@ -104,7 +104,7 @@ def run(
     missing = [
         task.recipe
         for task in share_of(part, tasks)
-        if not is_solved(folder / f"{task.recipe.name}.npz")
+        if not is_solved(folder / f"{task.recipe.name}.npz", task.recipe)
     ]
     jobs = [(recipe, solve) for recipe in missing]
     failures = []

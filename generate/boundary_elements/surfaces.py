@@ -205,8 +205,6 @@ def campaign(kind: str = "elastic") -> list[Task]:
                     )
                 )
     if kind == "bandwidth":
-        # stable: in the order listed
-        tasks.sort(key=lambda entry: entry[1])
         return [*(entry[3] for entry in tasks), *refined]
     tasks.sort(key=lambda entry: entry[:3])
     return sorted(

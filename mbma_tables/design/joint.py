@@ -81,7 +81,7 @@ from mbma_tables.design.uncertainty import (
 )
 from mbma_tables.design.unknowns import OfOneMap, Unknowns, unknowns_of
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.drawing import entries_of, with_area
+from mbma_tables.surfaces.drawing import entries_of, lacks_area, with_area
 from mbma_tables.surfaces.roughness import TOPS
 from mbma_tables.surfaces.surface import Surface, assumptions
 from mbma_tables.theories import THEORIES, is_table, resolve, theory_text
@@ -265,7 +265,8 @@ class Joint(JointQuantities, Displayed):
             if of_part and self.nominal_area is None and "nominal_area" in part:
                 object.__setattr__(self, "nominal_area", part.pop("nominal_area"))
             object.__setattr__(self, name, part)
-        if assumed and self.nominal_area is None:
+        faces = [getattr(self, name) for name in FACES]
+        if self.nominal_area is None and any(lacks_area(part) for part in faces):
             area: dict[str, Any] = {}
             with_area(area, assumed)
             object.__setattr__(self, "nominal_area", area["nominal_area"])

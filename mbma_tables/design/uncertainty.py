@@ -37,7 +37,7 @@ from mbma_tables.contacts.quantities.declaration import DIMENSIONLESS
 from mbma_tables.contacts.result import Contact, panel_label
 from mbma_tables.design.specimen import surface_of_entries
 from mbma_tables.surfaces.any_surface import AnySurface
-from mbma_tables.surfaces.drawing import entries_of, with_area
+from mbma_tables.surfaces.drawing import entries_of, lacks_area, with_area
 from mbma_tables.surfaces.roughness import spread_of_processes
 from mbma_tables.theories.base import Theory, UserTheory
 
@@ -643,7 +643,7 @@ def _described(
             f"Surface or of Surface.from_moments, got {surface!r}"
         )
     surface, assumed = entries_of(surface)
-    if assumed:
+    if lacks_area(surface):
         with_area(surface, assumed)
     given = {"surface": surface, "bodies": entries_of_bodies(bodies)}
 

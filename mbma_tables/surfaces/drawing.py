@@ -101,6 +101,12 @@ def drawing_of(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]
     cut_off, filter_ = next(row[1:] for row in SETTINGS if row[0] >= Ra)
     shortest_most = min(COARSEST * filter_, cut_off / 8)
     longest_least = max(LONGEST * cut_off, LEAST_BAND * shortest_most)
+    if "shortest" in numbers:
+        coarsest = _end_of("shortest", numbers, "high")
+        longest_least = min(max(longest_least, LEAST_BAND * coarsest), 0.9 * cut_off)
+    if "longest" in numbers:
+        finest = _end_of("longest", numbers, "low") / LEAST_BAND
+        shortest_most = max(min(shortest_most, finest), 1.1 * filter_)
     slope = next((name for name in SLOPES if name in numbers), "")
     hurst = _hurst(numbers, slope, cut_off, filter_)
     if slope:
@@ -151,6 +157,13 @@ def _micrometres(name: str, value: Any, unit: str | None) -> float:
     if number.ndim or not number > 0:
         raise InputError(f"{name} of a drawing is one positive number, got {value!r}")
     return float(number) * factor(unit, "um")
+
+
+def _end_of(name: str, numbers: Mapping[str, Any], end: str) -> float:
+    """A wavelength of a drawing [um], or the "low" or "high" end of its range."""
+    known = distribution_of(name, numbers[name])
+    value = numbers[name] if known is None else known.written(getattr(known, end))
+    return _micrometres(name, value, numbers.get("unit"))
 
 
 def _mean_height_of(Rz: Any, numbers: Mapping[str, Any]) -> str:
@@ -273,6 +286,12 @@ def record_of(surface: Any) -> Mapping[str, Any] | None:
     if len(records) < 2 or records[-1].get("step") != STEP:
         return None
     return dict(records[-1]["given"])
+
+
+def lacks_area(part: Any) -> bool:
+    """Whether numbers of a face of a process have no highest point."""
+    named = isinstance(part, Mapping) and part.get("process") is not None
+    return named and "map" not in part and not top_in(part)
 
 
 def top_in(given: Mapping[str, Any]) -> bool:

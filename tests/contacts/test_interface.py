@@ -354,6 +354,7 @@ test_gases_that_are_refused = refusals(
         face, "10 GPa", area=0.01, theory="calibrated"
     ).gap_conductance(**given),
     (FACE, {"gas": "xenon"}, "no gas is named 'xenon'"),
+    (FACE, {"gas": "hydrogen"}, "hydrogen has no conductance .* accommodation"),
     (FACE, {"temperature": 100.0}, "from 200 to 600 K"),
     (FACE, {"temperature": np.nan}, "finite"),
     (FACE, {"gas_pressure": 0.0}, "positive"),

@@ -298,7 +298,7 @@ def test_loads_of_large_surfaces_are_kept_one_by_one(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         solve.simulate_wide(RECIPE, folder)
     path = folder / f"{RECIPE.name}.npz"
-    assert not solve.is_solved(path)
+    assert not solve.is_solved(path, RECIPE)
     pressed.clear()
     run(
         [Task(RECIPE, TRAINING)],
@@ -307,7 +307,7 @@ def test_loads_of_large_surfaces_are_kept_one_by_one(tmp_path, monkeypatch):
     )
     # one load alone was left
     assert pressed == [0.02]
-    assert solve.is_solved(path)
+    assert solve.is_solved(path, RECIPE)
     found = dataset([Task(RECIPE, TRAINING)], folder, "bandwidth")
     for name in ("area", "mean_separation", "energy"):
         np.testing.assert_allclose(found[name][0], whole[name], rtol=1e-3)

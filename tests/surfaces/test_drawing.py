@@ -24,7 +24,7 @@ def width(found, name="unloading_stiffness"):
 
 def of(part, **more):
     joint = Joint(part, bodies=METAL, **{"nominal_area": "4 cm^2"} | more)
-    return joint.uncertainty("5 MPa", draws=600)
+    return joint.uncertainty("5 MPa", draws=600, quantities=QUANTITIES)
 
 
 @pytest.mark.parametrize(
@@ -135,6 +135,55 @@ def test_knowing_less_never_looks_better():
                 kind = {"area": "area", "mean_separation": "gap"}.get(name, "stiffness")
                 maps = 2 * 1.645 * float(row[f"{kind}_spread"])
                 assert width(found, name) > 0.95 * maps, (process, name)
+
+
+@pytest.mark.parametrize(
+    ("part", "number"),
+    [
+        ({"Ra": "1.6 um", "process": "milled"}, "longest"),
+        ({"Ra": "0.4 um", "process": "ground", "longest": "0.25 mm"}, "shortest"),
+        ({"Ra": "3.2 um", "process": "turned"}, "hurst"),
+        ({"Ra": "0.8 um", "process": "lapped", "hurst": 0.6}, "longest"),
+        ({"Ra": "6.3 um", "process": "blasted"}, "shortest"),
+        ({"Ra": "1 um", "process": "gaussian", "hurst": 0.8}, "longest"),
+    ],
+)
+def test_a_band_is_no_narrower_without_a_number(part, number):
+    # of one value a band may be wider than that of the range; over its values it is not
+    names = ("unloading_stiffness", "solid_conductance", "total_conductance")
+
+    def band(**more):
+        joint = Joint(part | more, bodies=METAL, nominal_area="4 cm^2")
+        found = joint.uncertainty("5 MPa", draws=100, quantities=names)
+        return [width(found, name) for name in names], bool(found.valid[0])
+
+    without, valid = band()
+    own = distribution_of(number, drawing_of(part)[0][number])
+    values = [
+        own.written(float(own.quantile(level))) for level in (0.1, 0.3, 0.5, 0.7, 0.9)
+    ]
+    known = [band(**{number: value}) for value in values]
+    assert (np.mean([each for each, _ in known], axis=0) < without).all()
+    # valid without the number is valid with it, whatever it is
+    assert not valid or all(with_it for _, with_it in known)
+
+
+def test_more_numbers_never_turn_an_answer_into_a_refusal():
+    """A coarse stylus was refused beside the default's long waves, and a full face for want of an area."""
+    part = {"Ra": "1.6 um", "process": "milled", "shortest": "100 um"}
+    longest = drawing_of(part)[0]["longest"]
+    assert longest == "400..800 um log"
+    assert of(part).draws == 600
+    # a wave that is given leaves shorter ones a band of four
+    assert drawing_of({**part, "shortest": None, "longest": "20 um"})[0]["shortest"] == (
+        "2.5..5 um log"
+    )
+    full = part | {"longest": "0.8 mm", "hurst": 0.8}
+    joint = Joint(full, bodies=METAL)
+    assert list(joint.inputs) == ["nominal_area"]
+    assert joint.assumed["nominal_area"].startswith("1..100 cm^2")
+    by_name = uncertainty(full, METAL, pressure="5 MPa", draws=100, quantities=["area"])
+    assert np.isfinite(by_name.quantiles["area"]).all()
 
 
 def test_gaussian_ranges_of_a_tested_kind_are_valid_and_others_are_not():

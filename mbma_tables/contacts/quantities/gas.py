@@ -86,12 +86,19 @@ GASES = {
     "argon": GasConstants(39.948e-3, 5 / 3, 0.95, *ARGON),
 }
 VACUUM = "vacuum"
+# gases that flow through seals and have no conductance
+WITHOUT_ACCOMMODATION = ("hydrogen", "methane")
 
 
 def checked_gas(
     gas: Any, temperature: ArrayLike, pressure: ArrayLike, accommodation: ArrayLike | None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Temperature [K], pressure [Pa] and thermal accommodation of a gas, at which its properties are known."""
+    if isinstance(gas, str) and gas in WITHOUT_ACCOMMODATION:
+        raise InputError(
+            f"{gas} has no conductance here, since its accommodation on machined metals was "
+            f"not found in print: give one of {', '.join((*GASES, VACUUM))}"
+        )
     if not isinstance(gas, str) or gas not in (*GASES, VACUUM):
         raise InputError(
             f"no gas is named {gas!r}: {nearest(str(gas), [*GASES, VACUUM])}"
