@@ -172,6 +172,24 @@ size_t mbma_calibrated_ends(const mbma_calibrated_table *t, const mbma_surfaces 
     return bad;
 }
 
+/* A/A0 at a force. */
+MBMA_INLINE double area_at(const mbma_calibrated_table *t, double s0, double force) {
+    const double over = force / t->area_t0;
+    return mbma_erf(force * sqrt(2.0 * (1.0 + over) / (s0 + over)));
+}
+
+size_t mbma_calibrated_areas(const mbma_calibrated_table *t, const mbma_surfaces *surfaces, size_t n,
+                             const int64_t *owner, const double *force, double *restrict area) {
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        const double s0 = surfaces->ends[2 * held_owner(surfaces, owner[k])];
+        const bool good = force[k] >= 0.0 && force[k] < INFINITY && (uint64_t)owner[k] < surfaces->count && s0 == s0;
+        area[k] = good ? area_at(t, s0, force[k]) : NAN;
+        bad += !good;
+    }
+    return bad;
+}
+
 size_t mbma_calibrated_contact(const mbma_calibrated_table *t, const mbma_surfaces *surfaces, size_t n,
                                const int64_t *owner, const double *u, double *restrict force, double *restrict area,
                                double *restrict stiffness) {
@@ -193,8 +211,7 @@ size_t mbma_calibrated_contact(const mbma_calibrated_table *t, const mbma_surfac
         for (size_t k = 0; k < count; k++) {
             const double endless = log_F[k] < -700.0 ? 0.0 : mbma_exp(log_F[k]);
             double steep;
-            const double load = endless * mbma_ended(end[k] - log_F[k], &steep), over = load / t->area_t0;
-            const double share = mbma_erf(load * sqrt(2.0 * (1.0 + over) / (s0[k] + over)));
+            const double load = endless * mbma_ended(end[k] - log_F[k], &steep), share = area_at(t, s0[k], load);
             const double known = gap[k] == gap[k] && end[k] == end[k] ? 0.0 : NAN;
             const double touching = gap[k] >= h_max[k] ? 0.0 : 1.0;
             const bool full = gap[k] <= 0.0;

@@ -373,6 +373,10 @@ size_t mbma_calibrated_ends(const mbma_calibrated_table *table, const mbma_surfa
 size_t mbma_calibrated_contact(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, size_t n,
                                const int64_t *owner, const double *u, double *force, double *area, double *stiffness);
 
+/* Areas at forces. */
+size_t mbma_calibrated_areas(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, size_t n,
+                             const int64_t *owner, const double *force, double *area);
+
 /* Mean separations at forces > 0. */
 size_t mbma_calibrated_separation(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, size_t n,
                                   const int64_t *owner, const double *force, double *u);

@@ -17,6 +17,7 @@ from mbma_tables.theories import Mbma
 
 # kinds of points that the programs below replay: calls with one answer
 KINDS = ("phi", "geometry", "total", "formula", "calibrated", "separation")
+KINDS += ("joint", "joint_separation")
 
 CONSUMER = """
 cmake_minimum_required(VERSION 3.15)
@@ -44,16 +45,19 @@ program replay
   implicit none
   character(16) :: kind
   integer :: given, status, k, unit
-  real(c_double) :: v(8), answer(14), d
+  real(c_double) :: v(10), answer(14), d
   type(mbma_answer) :: phi
   type(mbma_island) :: island
   type(mbma_contact) :: contact, contacts(2)
   type(mbma_surface) :: surface
+  type(mbma_bodies) :: bodies
+  type(mbma_joint) :: joint
   real(c_double), allocatable :: spectrum(:)
   open (newunit=unit, file="points.txt", status="old")
   do
     read (unit, *, end=1) kind, given, (v(k), k = 1, given)
     surface = mbma_surface(v(1), v(2), v(3), v(4), v(5))
+    bodies = mbma_bodies(v(6), v(7), v(8), v(9))
     answer = 0
     select case (kind)
     case ("phi")
@@ -75,6 +79,12 @@ program replay
       answer(:4) = transfer(contact, answer(:4))
     case ("separation")
       status = mbma_calibrated_separation_of(surface, v(6), v(7), d)
+      answer(1) = d
+    case ("joint")
+      status = mbma_joint_of(surface, bodies, v(10), joint)
+      answer(:size(transfer(joint, answer))) = transfer(joint, answer)
+    case ("joint_separation")
+      status = mbma_joint_separation_of(surface, bodies, v(10), d)
       answer(1) = d
     end select
     print "(i0, 14(1x, es25.17e3))", status, answer
@@ -100,6 +110,7 @@ fn main() {
         let words: Vec<&str> = line.split(' ').collect();
         let v: Vec<f64> = words[2..].iter().map(|word| word.parse().unwrap()).collect();
         let surface = || mbma::Surface { hurst: v[0], q0: v[1], q1: v[2], h_rms: v[3], h_max: v[4] };
+        let bodies = || mbma::Bodies { E_star: v[5], hardness: v[6], nu: v[7], conductivity: v[8] };
         let of = |c: mbma::Contact| vec![c.force, c.area, c.stiffness, c.error];
         let answer = match words[0] {
             "phi" => mbma::phi_of(v[0], v[1]).map(|a| vec![a.phi_F, a.phi_A, a.error]),
@@ -109,6 +120,10 @@ fn main() {
                 i.width]),
             "total" => mbma::total_of(&surface(), v[5], v[6], v[7]).map(of),
             "calibrated" => mbma::calibrated_of(&surface(), v[5], v[6]).map(of),
+            "joint" => mbma::joint_of(&surface(), &bodies(), v[9]).map(|j| vec![
+                j.force, j.area, j.stiffness, j.error, j.yielded, j.unloading_stiffness, j.tangential_stiffness,
+                j.solid_conductance, j.plane_separation]),
+            "joint_separation" => mbma::joint_separation_of(&surface(), &bodies(), v[9]).map(|d| vec![d]),
             _ => mbma::calibrated_separation_of(&surface(), v[5], v[6]).map(|d| vec![d]),
         }.unwrap();
         let numbers: Vec<String> = answer.iter().map(|number| format!("{:e}", number)).collect();

@@ -40,6 +40,10 @@ SHARES = (1e-4, 0.01, 0.2, 0.5, 0.9, 0.99)  # u/h_max
 DEPTHS = (1.9, 0.9, 0.4, 0.03)  # (h_max - d)/h_max
 TOLERANCES = {"phi": 1e-13, "geometry": 1e-13, "total": 1e-13, "formula": 1e-13}
 TOLERANCES |= {"calibrated": 1e-12, "separation": 1e-12}  # whose logarithm is the table's
+TOLERANCES |= {
+    "joint": 1e-11,
+    "joint_separation": 1e-11,
+}  # two of them one after the other
 MODEL = [name for name in SOURCES if name != SELFTEST]
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
 SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
@@ -86,8 +90,10 @@ def many_points(variant="reported"):
             rng.uniform(np.log(1e-9), np.log(12.0), POINTS // 10 // SURFACES)
         )
         shares = SHARES if zeta_1 < 9.9e4 else ()
+        nu, conductivity = rng.uniform(-0.9, 0.5), rng.uniform(0.1, 400.0)
+        bodies = ((np.exp(rng.uniform(-5.0, 1.5)), nu, conductivity),)
         lines += conformance.surface_rows(
-            surface, get_variant(variant), approach, DEPTHS, shares, 7.5
+            surface, get_variant(variant), approach, DEPTHS, shares, 7.5, bodies=bodies
         )
     return "\n".join(lines) + "\n"
 
@@ -120,7 +126,7 @@ def assert_equal_to_runtime(replay):
     assert {kind: n for kind, n in replay.points.items() if n} == asked
     assert asked["formula"] > POINTS // 2
     assert asked["total"] == 4 * SURFACES
-    assert asked["calibrated"] > 5 * SURFACES // 2
+    assert asked["calibrated"] == asked["joint"] > 5 * SURFACES // 2
     for kind, most in TOLERANCES.items():
         assert replay.largest[kind] <= most, (kind, replay.largest[kind])
 
@@ -230,6 +236,7 @@ def test_c_replays_its_points(c_folder, tmp_path):
     assert found.failed == 0
     fixed = {"phi": 64, "geometry": 24, "status": 10}
     fixed |= dict.fromkeys(("total", "calibrated", "separation"), 12)
+    fixed |= dict.fromkeys(("joint", "joint_separation"), 36)
     assert found.points == fixed | {"formula": found.points["formula"]}
     assert found.points["formula"] > 5
 
@@ -353,6 +360,41 @@ def test_no_answer_has_a_status_and_nan(c_folder, tmp_path):
         answers, said = total(*numbers)
         assert said == message
         assert np.isnan(answers).all()
+
+    def joint(function, count, *numbers):
+        """Answers and the meaning of the status, of a surface's numbers, bodies and a gap or a force."""
+        surface, bodies, answers = (
+            np.array(numbers[:5]),
+            np.array(numbers[5:9]),
+            np.empty(count),
+        )
+        places = [ctypes.c_void_p(array.ctypes.data) for array in (surface, bodies)]
+        written = ctypes.c_void_p(answers.ctypes.data)
+        status = function(*places, ctypes.c_double(numbers[9]), written)
+        return answers, library.mbma_message(status)
+
+    steel = (0.8, 1.0, 100.0, 1.0, 3.0, 1.0, 0.2, 0.3, 45.0)
+    at_gap = functools.partial(joint, library.mbma_joint_of, len(conformance.JOINT))
+    at_force = functools.partial(joint, library.mbma_joint_separation_of, 1)
+    for function, value in ((at_gap, 0.0), (at_gap, nan), (at_force, -1.0)):
+        answers, said = function(*steel, value)
+        assert said == invalid
+        assert np.isnan(answers).all()
+    for hardness in (0.0, -1.0, nan):
+        answers, said = at_gap(*steel[:6], hardness, *steel[7:], 1.0)
+        assert said == invalid
+        assert np.isnan(answers).all()
+    # no force reaches the hardness
+    answers, said = at_force(*steel, 0.2)
+    assert said == b"the table of the theory does not hold such a surface"
+    assert np.isnan(answers).all()
+    # what is not known is NaN alone
+    answers, said = at_gap(*steel[:7], nan, nan, 1.0)
+    missing = [
+        name for name, one in zip(conformance.JOINT, answers, strict=True) if one != one
+    ]
+    assert (missing, said) == (["tangential_stiffness", "solid_conductance"], b"no error")
+    assert at_force(*steel, 0.0)[0].tolist() == [3.0]
     for gap in (3.0, 3.5):  # no contact from h_max on
         answers, said = total(*good[:5], gap, *good[6:])
         assert (answers.tolist(), said) == ([0.0] * 4, b"no error")

@@ -31,7 +31,7 @@ _PROTOTYPE = re.compile(
     r"^(int|double|size_t|const char \*)\s?(mbma_\w+)\(([^)]*)\);", re.MULTILINE
 )
 _RECORD = re.compile(
-    r"^typedef struct \{\s*double ([\w, ]+);\s*\} (mbma_\w+);", re.MULTILINE
+    r"^typedef struct \{\s*double ([\w,\s]+);\s*\} (mbma_\w+);", re.MULTILINE
 )
 _STATUSES = re.compile(r"typedef enum \{([^}]*)\} mbma_status;")
 _STATUS = re.compile(r"(MBMA_\w+) = (\d+),? +/\* (.*) \*/")
@@ -121,7 +121,7 @@ def declarations(core_header: str, model_header: str) -> Declarations:
         constants.append(Constant(name, value))
     used = {argument.kind for one in functions for argument in one.arguments}
     records = [
-        Record(name, tuple(fields.split(", ")))
+        Record(name, tuple(re.split(r",\s*", fields)))
         for fields, name in _RECORD.findall(core_header + model_header)
         if name in used
     ]

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbma_tables import __version__
+from mbma_tables.bodies.materials import ISOTROPIC_SHARE
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
@@ -55,6 +56,7 @@ from mbma_tables.theories.mbma.closed_form_certificates import CERTIFICATES, RAN
 from mbma_tables.theories.mbma.closed_forms import FUNCTIONS
 from mbma_tables.theories.mbma.models import get_model
 from mbma_tables.theories.mbma.sums import QUADRATURE_SHARE
+from mbma_tables.theories.yielding import formulas as yielding
 
 CORE = (
     "totals.c",
@@ -82,6 +84,7 @@ PACKAGE = {
     "mbma_model.rs": "//",
 }
 TIMEOUT = 300.0  # seconds, of a build or a replay
+REACHED = 1e-13  # relative, of forces at which separations are found
 # flags of the library; rounding does not depend on the compiler
 FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math")
 USAGE = (
@@ -182,6 +185,8 @@ def model_texts(heads: dict[str, str], is_of_four: bool = False) -> dict[str, st
         "CALIBRATED_ERROR": number(calibrated_table.shipped().error),
         "LAW_ERROR": number(LAW_ERROR),
         "PERSSON_ERROR": number(persson.INVERSE_RTOL),
+        "ISOTROPIC_SHARE": number(ISOTROPIC_SHARE),
+        "REACHED": number(REACHED),
     }
     return {
         name: filled(f"model/{name}", **parts, HEADER=heads[name])
@@ -281,6 +286,9 @@ def data_text(model: IslandTable, variant: Variant, later: bool = False) -> str:
         f"{table_type(model)} CELLS": island_table(model),
         "mbma_calibrated_table LAW": braces(braces(*spline), *numerals(theories[1][:3])),
         "mbma_law_constants THEORIES[]": braces(*theories),
+        "mbma_hardness_law HARDNESS": braces(
+            *numerals(np.array(dataclasses.astuple(yielding.CONSTANTS)))
+        ),
         "mbma_variant MBMA_VARIANT": _variant(variant.numbers),
     }
     held = (
@@ -295,6 +303,7 @@ def data_text(model: IslandTable, variant: Variant, later: bool = False) -> str:
         "const mbma_calibrated_table *mbma_law_table(void) { return &LAW; }",
         "const mbma_variant *mbma_model_variant(void) { return &MBMA_VARIANT; }",
         "const mbma_law_constants *mbma_theory(int theory) { return &THEORIES[theory == MBMA_CALIBRATED]; }",
+        "const mbma_hardness_law *mbma_hardness(void) { return &HARDNESS; }",
     ]
     return "\n".join([*lines, ""])
 
@@ -573,7 +582,7 @@ TARGETS = (
         ModelOptions,
         output=(
             "the whole model, C11: the table, island geometry, totals, the closed "
-            "forms; the calibrated law and Persson's theory"
+            "forms; the calibrated law, with a hardness too, and Persson's theory"
         ),
         outside="NaN, and a status",
         tested=(

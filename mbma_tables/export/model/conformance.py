@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from mbma_tables.bodies.bodies import Bodies
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.contacts.contact import contact
 from mbma_tables.export.text import comment, number
@@ -28,6 +29,18 @@ Rows = Iterator[str]
 IslandTable = UniversalModel | Island4dModel
 FORM = "standard"  # the form of island model "formula"
 POINTS_FILE = "mbma_conformance.csv"
+# of `mbma_joint` of mbma_model.h; the second is of the file, the others of a contact
+JOINT = (
+    "force",
+    "area",
+    "stiffness",
+    "error",
+    "yielded",
+    "unloading_stiffness",
+    "tangential_stiffness",
+    "solid_conductance",
+    "plane_separation",
+)
 KINDS = {
     "geometry": f"approach, hurst, zeta_1; {', '.join(FIELDS)}",
     "total": "hurst, q0, q1, h_rms, h_max, separation, E_star, rtol; force, area, stiffness, error",
@@ -35,6 +48,13 @@ KINDS = {
     "formula": "X, mu; phi_F, phi_A by the closed form, its error",
     "calibrated": "hurst, q0, q1, h_rms, h_max, mean separation, E_star; force, area, stiffness, error",
     "separation": "hurst, q0, q1, h_rms, h_max, force, E_star; mean separation by the calibrated law",
+    "joint": (
+        "hurst, q0, q1, h_rms, h_max, E_star, hardness, nu, conductivity, mean separation; "
+        f"{', '.join(JOINT)}"
+    ),
+    "joint_separation": (
+        "hurst, q0, q1, h_rms, h_max, E_star, hardness, nu, conductivity, force; mean separation"
+    ),
 }
 # of the first kind, "phi" or of a table of four numbers "lookup"
 PHI = "X, mu; phi_F, phi_A, the bound on their error"
@@ -58,6 +78,8 @@ SURFACES = (
 )
 DEPTHS = (0.05, 0.3, 0.8, 1.4)  # (h_max - d)/h_max
 SHARES = (0.02, 0.3, 0.7, 0.99)  # u/h_max
+# hardness over E* times the rms gradient, Poisson's ratio and mean conductivity
+BODIES = ((0.03, 0.3, 45.0), (0.4, 0.0, 0.2), (math.inf, 0.5, 400.0))
 RTOL = 1e-8
 
 
@@ -117,8 +139,13 @@ def surface_rows(
     shares: Any,
     E_star: float = 1.0,
     table: IslandTable | None = None,
+    bodies: Iterable[tuple[float, ...]] = BODIES,
 ) -> Rows:
-    """Islands and totals of one surface, gap by gap, and the calibrated law at shares of h_max, by the library."""
+    """Islands and totals of one surface, gap by gap, and the calibrated law at shares of h_max, by the library.
+
+    The law also of `bodies`, each with a hardness over E* times the rms gradient, Poisson's
+    ratio and mean conductivity.
+    """
     own = Surface(*surface)
     model = table or universal_model()
     fields = geometry(approach, own.hurst, own.zeta_1, variant)
@@ -154,6 +181,33 @@ def surface_rows(
             "calibrated", (*surface, u, E_star), (*values, 0.0), (*values, ANY)
         )
         yield from rows("separation", (*surface, found.pressure, E_star), (u,))
+        for eta, *others in bodies:
+            hardness = eta * E_star * float(own.rms_gradient)
+            yield from joint_rows(surface, (E_star, hardness, *others), u)
+
+
+def joint_rows(
+    surface: tuple[float, ...], numbers: tuple[float, ...], u: FloatArray
+) -> Rows:
+    """Contacts with a hardness at mean separations, and the separations at their forces."""
+    E_star, hardness, nu, conductivity = numbers
+    bodies = Bodies(E_star, hardness=hardness, nu=nu, conductivity=conductivity)
+    found = contact(Surface(*surface), bodies, mean_separation=u, theory="calibrated")
+    values = [
+        np.zeros(u.size)
+        if name == "error"
+        else getattr(found, "pressure" if name == "force" else name)
+        for name in JOINT
+    ]
+    scales = [
+        ANY if name == "error" else np.abs(value)
+        for name, value in zip(JOINT, values, strict=True)
+    ]
+    yield from rows("joint", (*surface, *numbers, u), values, scales)
+    # which rounding of the force moves by as much of this
+    least = np.maximum(u, found.pressure / found.stiffness)
+    given = (*surface, *numbers, found.pressure)
+    yield from rows("joint_separation", given, (u,), (least,))
 
 
 def universal_rows(model: UniversalModel) -> Rows:
