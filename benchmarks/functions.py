@@ -1,6 +1,6 @@
 """``python -m benchmarks functions``: tables of functions, the error on a million points that no table saw, and times.
 
-It writes the table of docs/functions.md.
+It writes the table of docs/tables.md.
 """
 
 import functools
@@ -153,10 +153,10 @@ def row_of(
 @click.command()
 @click.option("--out", type=click.Path(path_type=pathlib.Path), default=ROOT)
 def functions(out: pathlib.Path) -> None:
-    """Make tables of seven functions, measure them, and write docs/functions.md (two minutes)."""
+    """Make tables of seven functions, measure them, and write docs/tables.md (two minutes)."""
     cells = [row_of(name, *case, POINTS) for name, case in CASES.items()]
     cells.append(row_of("island", {"axes": _island_axes()} | LOG, 2e-5, ISLAND_POINTS))
     text = page.table(HEADER, cells)
     click.echo(text)
-    for path in page.write("docs/functions.md", {"functions": text}, {}, out):
+    for path in page.write("docs/tables.md", {"functions": text}, {}, out):
         click.echo(path)

@@ -1,6 +1,6 @@
 """``python -m benchmarks table_uses``: derivatives, inverses, tables of theories, and the ways to make a table.
 
-It writes three tables of docs/functions.md: derivatives and inverses of tables of functions
+It writes three tables of docs/tables.md: derivatives and inverses of tables of functions
 against the functions, tables of theories with the time of their answers, and the bits of a
 table that was made in parts, on a cluster, or after its process was killed.
 """
@@ -270,9 +270,9 @@ BLOCKS: dict[str, Any] = {
 @click.argument("blocks", nargs=-1, type=click.Choice([*BLOCKS]))
 @click.option("--out", type=click.Path(path_type=pathlib.Path), default=ROOT)
 def table_uses(blocks: tuple[str, ...], out: pathlib.Path) -> None:
-    """Use tables of functions and theories, measure that, and write docs/functions.md (five minutes)."""
+    """Use tables of functions and theories, measure that, and write docs/tables.md (five minutes)."""
     for block in blocks or BLOCKS:
         text = BLOCKS[block]()
         click.echo(text)
-        for path in page.write("docs/functions.md", {block: text}, {}, out):
+        for path in page.write("docs/tables.md", {block: text}, {}, out):
             click.echo(path)

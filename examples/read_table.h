@@ -1,4 +1,4 @@
-/* A table of a function from its netCDF file; docs/functions.md has the commands. */
+/* A table of a function from its netCDF file; docs/tutorials/functions.md has the commands. */
 #ifndef READ_TABLE_H
 #define READ_TABLE_H
 

@@ -3,7 +3,7 @@ function [values, errors] = read_table(table, x)
 %   t = read_table('force.nc')         reads it
 %   [v, e] = read_table(t, x)          values and bounds on their absolute errors at points x, one a row
 %   worst = read_table(t, 'selftest')  the largest error at the points of the file over its bound, at most 1
-% A row is NaN where the table has no answer. docs/functions.md says what the variables mean.
+% A row is NaN where the table has no answer. docs/tutorials/functions.md says what the variables mean.
 errors = [];
 if ischar(table)
   values = read(table);

@@ -45,7 +45,7 @@ COMMANDS = {
 # parts of the documentation, by the page that each fills and the function that measures it
 PARTS = {
     "architecture": ("docs/architecture.md", "pages.library:architecture"),
-    "formula": ("docs/formula.md", "pages.library:formula"),
+    "formula": ("docs/model.md", "pages.library:formula"),
     "readme": ("README.md", "pages.library:readme"),
     "tables": ("docs/tables.md", "pages.library:tables"),
     "theories": ("docs/theories.md", "pages.library:theories"),

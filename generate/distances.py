@@ -267,14 +267,14 @@ def summed_up(
 
 
 def pocket_area(pressure: FloatArray, alpha: float) -> FloatArray:
-    """A/A0 at p/(E* g): the area law of docs/formula.md."""
+    """A/A0 at p/(E* g): the area law of docs/model.md."""
     t = pressure / 0.33
     s = (0.51 + 0.033 * np.log(alpha / 10) + t) / (1 + t)
     return np.asarray(erf(pressure * np.sqrt(2 / s)))
 
 
 def pocket_pressure(u: FloatArray, nu: float) -> FloatArray:
-    """p/(E* q0 h_rms) at u/h_rms: the law of separation of docs/formula.md, by the spectrum's narrowness."""
+    """p/(E* q0 h_rms) at u/h_rms: the law of separation of docs/model.md, by the spectrum's narrowness."""
     return np.asarray(u**-0.26 * np.exp(-1.91 * u - 2.8 * (nu - 0.63)))
 
 

@@ -1,7 +1,7 @@
 """`python -m generate formulas`: fit the closed forms again, certify them on other samples.
 
 `theories/mbma/closed_forms.toml` is the one place where the forms are kept; its expressions
-are Python and C. docs/formula.md says how the terms were chosen. Samples are rounded, so
+are Python and C. docs/model.md says how the terms were chosen. Samples are rounded, so
 that the same coefficients come out on all processors.
 
 With Phi_rigid the closed form of the rigid sphere, a function of islands is Phi_rigid/(1 + mu Q(X,

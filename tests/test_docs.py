@@ -298,11 +298,11 @@ def test_measured_parts_of_the_readme_are_the_generators():
     assert fill(README, parts) == README
     for name, figure in files.items():
         assert (ROOT / name).read_bytes()[:5] == svg(figure)[:5] == b"<?xml"
-    assert fill(PAGES["formula.md"], library.formula()[0]) == PAGES["formula.md"]
+    assert fill(PAGES["model.md"], library.formula()[0]) == PAGES["model.md"]
 
 
 def test_pocket_laws_are_printed_as_they_are_computed():
-    pocket = PAGES["formula.md"][PAGES["formula.md"].index("    t = p/(E* g)/") :]
+    pocket = PAGES["model.md"][PAGES["model.md"].index("    t = p/(E* g)/") :]
     names = {name: getattr(math, name) for name in ("log", "erf", "exp", "sqrt")}
     names |= {"p": 0.04, "alpha": 30.0, "nu": 0.6, "x": 1.3}
     for line in pocket.splitlines()[:4]:

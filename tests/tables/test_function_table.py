@@ -673,7 +673,7 @@ def test_the_text_for_slurm_submits_jobs_with_workers_of_its_scheduler(
 ):
     """The page's program with a stand-in for `sbatch` that keeps what it is given; no SLURM is at hand."""
     pytest.importorskip("dask_jobqueue")
-    page = pathlib.Path(__file__).parents[2] / "docs" / "functions.md"
+    page = pathlib.Path(__file__).parents[2] / "docs/tutorials/functions.md"
     block = next(
         part
         for part in page.read_text(encoding="utf-8").split("```text\n")

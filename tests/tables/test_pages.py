@@ -17,7 +17,7 @@ from generate.files import ROOT
 from mbma_tables.cli import main
 
 PAGES = [
-    "functions.md",
+    "tutorials/functions.md",
     pytest.param("tutorials/own_table.md", marks=pytest.mark.slow),
 ]
 FENCE = re.compile(r"^```(py|toml|sh|c)\n(.*?)^```\n(?:```text\n(.*?)^```)?", re.M | re.S)
@@ -74,7 +74,7 @@ def test_the_page_runs_and_prints_what_it_shows(page, tmp_path, monkeypatch):
             lines = SIZE.sub("", output).splitlines()[-len(shown.splitlines()) :]
             assert_same_output("\n".join(lines), SIZE.sub("", shown), rtol=0.1)
     assert kinds >= {"py", "toml", "sh"}
-    if page == "functions.md":
+    if page == "tutorials/functions.md":
         build = ["cc", "force.c", "force_selftest.c", "cells.c", "-lm", "-o", "test"]
         subprocess.run(build, cwd="code", check=True)
         subprocess.run([os.path.join(".", "test")], cwd="code", check=True)

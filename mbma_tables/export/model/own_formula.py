@@ -2,7 +2,7 @@
 
 The logarithm of a result of surfaces is a sum of a few products of letters, which are simple
 functions of the arguments, scaled to [-1, 1]; of islands the sum is log_Q of the shipped closed
-forms (docs/formula.md). Products are chosen one after the other (orthogonal matching
+forms (docs/tables.md). Products are chosen one after the other (orthogonal matching
 pursuit), the largest degree by the error on groups of points that a fit has not seen: all gaps of
 a surface are in one group, since the points of a curve tell of one another.
 """

@@ -1,4 +1,4 @@
-"""Closed forms of `closed_forms.toml` (docs/formula.md): the island model "formula", and total force and area."""
+"""Closed forms of `closed_forms.toml` (docs/model.md): the island model "formula", and total force and area."""
 
 from __future__ import annotations
 
