@@ -4,8 +4,9 @@ import csv
 
 import numpy as np
 
+from generate import distances
 from generate.page import Cell, Measured, table
-from mbma_tables import Joint
+from mbma_tables import Bodies, Joint, contact
 from mbma_tables.common.files import shipped_file
 from mbma_tables.common.plots import new_figure, number_ticks
 
@@ -24,6 +25,9 @@ FACES = {
 RATIO = 3.0
 RATIO_AT = "70 MPa"
 RATIO_METALS = ("titanium Ti-6Al-4V", "steel S235 hard")
+EXPONENT_METALS = ("aluminium 6061 hard", "stainless steel 304 soft")
+# p/E* between which the printed surface of the challenge was pressed; its gradient is 1
+PRINTED = (0.001, 1.0)
 DRAWS = 400
 
 
@@ -86,17 +90,50 @@ def ratios() -> str:
 
 
 def exponents() -> str:
-    """The exponent of the pressure in the conductance of the solid spots."""
-    found = joint(FACES["ground, Ra not stated"]).central
-    slopes = found.sensitivity(["1 MPa", "10 MPa"], ["solid_conductance"]).slopes
-    values = np.ravel(slopes["pressure"]["solid_conductance"])
-    return f"{values[0]:.2f} at 1 MPa and {values[1]:.2f} at 10 MPa"
+    """The exponent of the pressure in the conductance of the solid spots, between 1 and 10 MPa."""
+    rows: list[list[Cell]] = [["measured", "0.73"]]
+    for metal in EXPONENT_METALS:
+        faces = joint(FACES["ground, Ra not stated"], metal)
+        # without the spread of the law at one load, which both loads share
+        found = [
+            replica.at_pressure(["1 MPa", "10 MPa"]).contact.solid_conductance
+            for replica in faces.replicas(DRAWS)
+        ]
+        exponent = np.log10([each[1] / each[0] for each in found])
+        low, median, high = np.quantile(exponent, (0.05, 0.5, 0.95))
+        rows.append([metal, f"{low:.2f} to {high:.2f} ({median:.2f})"])
+    return table("metal | exponent of the pressure, 5% to 95% (median)", rows)
+
+
+def printed() -> str:
+    """Contact areas of the spectrum of the contact-mechanics challenge, with twice the scatter."""
+    own = distances.older("challenge").surface
+    found = contact(
+        own,
+        Bodies(1.0, hardness=np.inf),
+        pressure=np.array(PRINTED) * float(own.rms_gradient),
+        theory="calibrated",
+    )
+    spread = np.exp(2 * found.area_scatter)
+    rows: list[list[Cell]] = [["measured", "from 0.1%", "to 60%"]]
+    cells = [
+        f"{100 * area / factor:.2g} to {100 * min(area * factor, 1.0):.2g}%"
+        for area, factor in zip(found.area, spread, strict=True)
+    ]
+    rows.append(["calibrated law, two scatters", *cells])
+    header = " | ".join(f"p/E* = {pressure:g}" for pressure in PRINTED)
+    return table(f"area | {header}", rows)
 
 
 def measurements() -> Measured:
     """Blocks and the picture of the page of measurements."""
     conductance, files = conductances()
-    blocks = {"conductance": conductance, "ratios": ratios(), "exponents": exponents()}
+    blocks = {
+        "conductance": conductance,
+        "ratios": ratios(),
+        "exponents": exponents(),
+        "printed": printed(),
+    }
     return blocks, files  # type: ignore[return-value]
 
 

@@ -27,7 +27,9 @@ def test_valid_implies_within_the_range_of_the_simulations(theory):
     zetas = [one.zeta_1 for one in alike]
     if theory == "calibrated":
         with xr.open_dataset("docs/data/bandwidth.nc", group="bandwidth") as wide:
-            zetas += wide.zeta_1.values.tolist()
+            # of the others there are too few
+            evident = (wide["shape"] == 0) & (wide.waves >= 2)
+            zetas += wide.zeta_1.values[evident].tolist()
     areas = np.concatenate([one.area for one in alike])
     rng = np.random.default_rng(46)
     surface = random_surfaces(rng, 2000)
