@@ -96,7 +96,7 @@ def exponents() -> str:
         faces = joint(FACES["ground, Ra not stated"], metal)
         # without the spread of the law at one load, which both loads share
         found = [
-            replica.at_pressure(["1 MPa", "10 MPa"]).contact.solid_conductance
+            np.ravel(replica.at_pressure(["1 MPa", "10 MPa"]).contact.solid_conductance)
             for replica in faces.replicas(DRAWS)
         ]
         exponent = np.log10([each[1] / each[0] for each in found])
@@ -114,11 +114,11 @@ def printed() -> str:
         pressure=np.array(PRINTED) * float(own.rms_gradient),
         theory="calibrated",
     )
-    spread = np.exp(2 * found.area_scatter)
+    spread = np.exp(2 * np.ravel(found.area_scatter))
     rows: list[list[Cell]] = [["measured", "from 0.1%", "to 60%"]]
     cells = [
         f"{100 * area / factor:.2g} to {100 * min(area * factor, 1.0):.2g}%"
-        for area, factor in zip(found.area, spread, strict=True)
+        for area, factor in zip(np.ravel(found.area), spread, strict=True)
     ]
     rows.append(["calibrated law, two scatters", *cells])
     header = " | ".join(f"p/E* = {pressure:g}" for pressure in PRINTED)
