@@ -13,7 +13,7 @@ import functools
 import math
 import re
 import types
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -103,6 +103,8 @@ class Body:
     units: dict[str, str]
     newtons: float
 
+    attracts: ClassVar[bool] = False
+
     @functools.cached_property
     def ends(self) -> tuple[float, float]:
         """Mean separations between which the layer's law holds.
@@ -149,15 +151,29 @@ class Body:
         )
         return np.asarray(legendre.legval(t if self.plane else 2 * t**2 - 1, series))
 
-    def _newton(self, approach: float, radius: float, nodes: int) -> PressedBody:
+    def domain(
+        self, approach: float, nodes: int, radius: float | None = None
+    ) -> tuple[float, Basis, FloatArray]:
+        """Radius of what may be loaded, its basis, and gaps of rigid bodies at the nodes."""
+        if radius is None:
+            radius = math.sqrt(2 * self.radius * (approach + self.ends[1]))
         pressures = plane_basis(nodes) if self.plane else basis(nodes)
-        root = pressures.root_weights
+        return radius, pressures, pressures.v * radius**2 / (2 * self.radius) - approach
+
+    def operator(self, radius: float, pressures: Basis) -> FloatArray:
+        """Displacements of the half-space by pressures, of values times the roots of weights."""
         operator = radius * pressures.operator
         if self.plane:
+            root = pressures.root_weights
             operator = operator + 4 / math.pi * radius * math.log(
                 self.reference / radius
             ) * np.outer(root, root)
-        rigid = pressures.v * radius**2 / (2 * self.radius) - approach
+        return operator
+
+    def _newton(self, approach: float, radius: float | None, nodes: int) -> PressedBody:
+        radius, pressures, rigid = self.domain(approach, nodes, radius)
+        root = pressures.root_weights
+        operator = self.operator(radius, pressures)
         w = np.zeros(nodes)
         scale = abs(approach) + float(np.abs(rigid).max())
         for _ in range(STEPS):
@@ -179,9 +195,7 @@ class Body:
 
         The last number of nodes changes the force by a relative `rtol` at most.
         """
-        solution = self._newton(
-            approach, math.sqrt(2 * self.radius * (approach + self.ends[1])), NODES[0]
-        )
+        solution = self._newton(approach, None, NODES[0])
         for nodes in NODES:
             t = np.linspace(0, 1, PLACES * nodes + 1)
             p = self.layer(self.between(solution, solution.u, t))[0]
@@ -216,6 +230,15 @@ class Body:
             self.integral(at, stiffness),
             self.integral(at, np.where(at.p > 0, area, 0.0)),
         )
+
+    def compressive(self, at: PressedBody) -> FloatArray:
+        """Pressure over E* of what touches."""
+        return at.p
+
+    @property
+    def pull_off(self) -> float:
+        """Tension over E* at which the bodies part."""
+        return 0.0
 
     @property
     def name(self) -> str:

@@ -26,6 +26,7 @@ from mbma_tables.contacts.contact import contact
 from mbma_tables.contacts.law.law import ContactLaw
 from mbma_tables.contacts.law.make import contact_law
 from mbma_tables.contacts.question import name_of_the_given
+from mbma_tables.effects.attracting_body import AttractingBody, resolved
 from mbma_tables.effects.force_law import (
     RTOL,
     Body,
@@ -38,6 +39,7 @@ from mbma_tables.effects.force_law import (
 from mbma_tables.islands.half_space import basis
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import resolve
+from mbma_tables.theories.adhesion import Adhesive
 from mbma_tables.theories.base import Theory
 from mbma_tables.theories.calibrated.formulas import Spectrum, spectrum_of
 
@@ -57,6 +59,7 @@ COUNTED = 0.1  # share of the force above which a reason against the layer's law
 # spheres, `python -m generate rough_spheres`
 CELLS = (0.62, 0.8)
 NARROWEST = 1.5
+UNTESTED = "adhesion: no rough sphere or cylinder that attracts was simulated"
 WIDEST = 0.1  # contact radius over R, beyond which bodies are no half-spaces
 
 
@@ -96,6 +99,10 @@ class RoughContact(Displayed):
         "layer's law, and from the mean plane below the contact, which depends on the "
         "place on the faces"
     )
+    pull_off: Numbers = quantity(
+        "tension at which the bodies part, in the unit of force; 0 of bodies without "
+        "adhesion"
+    )
     valid: Any = quantity(
         "whether the law was tested for such contacts; at the places that carry nine "
         "tenths of the force, for contacts wider than 1.5 mean wavelengths and narrower "
@@ -121,11 +128,18 @@ class RoughContact(Displayed):
         >>> f"{ball.approach('10 N'):.4g} um"
         '0.4478 um'
         """
+        if self._body.attracts:
+            raise InputError(
+                "a law of force is of bodies without adhesion: it begins at first contact, "
+                "where attraction pulls; ask rough_contact for its approaches or forces"
+            )
         top = float(np.max(self.approach)) + ROUNDING * self.layer.h_max
         return force_law(self._body, top, number_in("rtol", rtol, 1e-6, 0.1))
 
     def _facts(self) -> dict[str, str]:
-        names = ("approach", "force", "stiffness", "area", "contact_radius", "valid")
+        names = ["approach", "force", "stiffness", "area", "contact_radius", "valid"]
+        if self._body.attracts:
+            names.insert(-1, "pull_off")
         facts = {"body": self._body.name}
         facts |= {
             name: shown(getattr(self, name), self.units.get(name, "1")) for name in names
@@ -155,14 +169,15 @@ class RoughContact(Displayed):
             ylabel=f"pressure [{units['pressure']}]",
         )
         curve.plot(approach[order], force[order], marker=".", label="rough")
+        order = order[force[order] >= 0]
         smooth = self._body.smooth_approach(
-            force / (self.layer.E_star * self._body.newtons)
+            force[order] / (self.layer.E_star * self._body.newtons)
         )
-        curve.plot(smooth[order], force[order], "--", label="smooth (Hertz)")
+        curve.plot(smooth, force[order], "--", label="smooth (Hertz)")
         curve.set(
             xlabel=f"approach [{units['approach']}]",
             ylabel=f"force [{units['force']}]",
-            yscale="log",
+            yscale="linear" if self._body.attracts else "log",
         )
         for axes in (profile, curve):
             axes.legend()
@@ -196,7 +211,8 @@ def rough_contact(
         R [length]; of two curved bodies 1/R = 1/R1 + 1/R2.
     bodies : Bodies or float or str
         As for `contact`. With a hardness, the roughness yields and the bodies do not;
-        results are for loading only.
+        results are for loading only. Spheres with an adhesion are answered in retreat, after they were pressed
+        together, and may be pulled.
     shape : {"sphere", "cylinder"}
         A cylinder is long, in plane strain.
     approach, force : array_like or str
@@ -216,9 +232,10 @@ def rough_contact(
     Raises
     ------
     InputError, OutOfRangeError
-        For numbers that are not positive and finite, and loads beyond the layer's law.
+        For numbers that are not positive and finite, loads beyond the layer's law, tensions beyond
+        pull-off, and cylinders with an adhesion.
     ConvergenceError
-        If the equation of the half-space is not solved.
+        If the equation of the half-space is not solved, as for large soft spheres whose attraction is short.
 
     Examples
     --------
@@ -235,11 +252,6 @@ def rough_contact(
             f"shape must be one of {SHAPES}, got {shape!r}; {nearest(str(shape), SHAPES)}"
         )
     law = contact_law(surface, bodies, theory, rtol=LAYER_RTOL)
-    if law.setup.bodies.adhesion is not None:
-        raise InputError(
-            "rough bodies that attract each other are not answered: their layer pulls beside "
-            "the contact, where the law ends; give bodies without adhesion"
-        )
     units = law.units
     plane = shape == "cylinder"
     largest = 1e30 * law.h_max
@@ -250,6 +262,16 @@ def rough_contact(
     layer_theory = resolve(theory, surface)
     fixed = number_in("reference", fixed, 1e-30 * R, largest)
     body = Body(law, R, plane, fixed, surface, layer_theory, *units_of(units, plane))
+    attraction = law.setup.bodies.adhesion
+    if attraction is not None:
+        if plane:
+            raise InputError(
+                "cylinders that attract each other are not answered: their approach depends on "
+                "the place where it is measured, by far more than attraction deforms them; "
+                "shape='sphere' is covered"
+            )
+        net = Adhesive(layer_theory, attraction, law.E_star)
+        body = resolved(AttractingBody(**vars(body), net=net))
     if name_of_the_given({"approach": approach, "force": force}) == "approach":
         wanted = finite_array("approach", units.number("approach", approach))
         apart = -body.ends[1]
@@ -260,12 +282,13 @@ def rough_contact(
             f"above {apart:.6g}, below which bodies are apart",
         )
     else:
-        positive_forces = finite_array("force", forces(force, body, units.length))
-        require("force", positive_forces, positive_forces > 0, "positive")
+        given = finite_array("force", forces(force, body, units.length))
+        if not body.attracts:
+            require("force", given, given > 0, "positive")
         scale = law.E_star * body.newtons
         wanted = np.reshape(
-            [body.approach_at(value / scale) for value in positive_forces.ravel()],
-            positive_forces.shape,
+            [body.approach_at(value / scale) for value in given.ravel()],
+            given.shape,
         )
     if wanted.ndim > 1:
         raise InputError(
@@ -284,17 +307,17 @@ def pressed(body: Body, wanted: FloatArray) -> RoughContact:
     for k, approach in enumerate(map(float, wanted.ravel())):
         solution = body.solved(approach, RTOL)
         force, stiffness, area = body.quantities(solution)
-        spread = rule.root_weights**2 * body.between(solution, solution.p, rule.v)
+        compressive = body.between(solution, body.compressive(solution), rule.v)
+        spread = rule.root_weights**2 * compressive
         a = float(
             0.75 * math.pi * solution.radius * np.sum(spread * rule.v) / np.sum(spread)
         )
         scatter, against = _trust(body, solution, force)
         width = 2 * a / mean_wavelength(body.surface)
-        # the mean plane below the contact: that of a cell
-        scatter = math.hypot(
-            scatter,
-            CELLS[0] / width ** CELLS[1] * float(body.surface.h_rms) * stiffness / force,
-        )
+        if not body.attracts:
+            # the mean plane below the contact: that of a cell
+            of_cell = CELLS[0] / width ** CELLS[1] * float(body.surface.h_rms)
+            scatter = math.hypot(scatter, of_cell * stiffness / force)
         if width < NARROWEST:
             against.append(f"the contact is narrower than {NARROWEST:g} mean wavelengths")
         for text in against:
@@ -302,7 +325,8 @@ def pressed(body: Body, wanted: FloatArray) -> RoughContact:
         t = np.linspace(0, 1, POINTS)
         p, u = (body.between(solution, values, t) for values in (solution.p, solution.u))
         rows.append((scale * force, scale * stiffness, area, a, solution.error, scatter))
-        profiles.append((solution.radius * t, np.maximum(p, 0) * body.law.E_star, u))
+        p = p if body.attracts else np.maximum(p, 0)
+        profiles.append((solution.radius * t, p * body.law.E_star, u))
     F, stiffness, area, a, error, scatter = (
         part.reshape(wanted.shape)[()] for part in np.array(rows).T
     )
@@ -315,7 +339,7 @@ def pressed(body: Body, wanted: FloatArray) -> RoughContact:
     valid = ~np.logical_or.reduce([np.zeros(wanted.shape, bool), *masks.values()])
     return RoughContact(
         masks, body.law, body.units, body, wanted[()], F, stiffness, area, a, position, pressure, u,
-        error + body.law.error, scatter, valid,
+        error + (0.0 if body.attracts else body.law.error), scatter, np.float64(scale * body.pull_off), valid,
     )  # fmt: skip
 
 
@@ -324,6 +348,8 @@ def _trust(body: Body, solution: PressedBody, force: float) -> tuple[float, list
 
     The law's deviation is alike at all places.
     """
+    if body.attracts:
+        return math.nan, [UNTESTED]
     law = body.law
     ends = body.ends
     u = np.clip(solution.u, *ends)

@@ -48,6 +48,7 @@ STEP = 1e-3  # relative, of mean gaps for slopes
 LOOKS = 48  # mean gaps at which a contact is looked for
 SMALLEST_GAP = 1e-10  # of them, over h_rms
 FARTHEST = 12.0  # and the largest, likewise, where contact has no end
+REACHES = 25.0  # ranges beyond it, where an exponential traction is rounding
 PARTING_NODES = 64
 # of a search, in ln u: steps at most; step from which digits double, if it is this share of that before
 # it; step that is rounding
@@ -201,7 +202,7 @@ class Adhesive(Theory):
             return None
 
         def make() -> AttractionCurve:
-            low, high = (float(end) for end in self._range_of_gaps(surface))
+            low, high = (float(end) for end in self.range_of_gaps(surface))
             ends = float(surface.h_rms), float(surface.h_max)
             return AttractionCurve(knots_of(low, high, *ends))
 
@@ -260,11 +261,11 @@ class Adhesive(Theory):
             passed_on = (error * (pressure + pull) + RTOL * pull) / np.abs(net)
         return TheoryAnswer(net, area, stiffness + slope, passed_on)
 
-    def _range_of_gaps(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
+    def range_of_gaps(self, surface: AnySurface) -> tuple[FloatArray, FloatArray]:
         """Mean gaps between which contacts at pressures are looked for."""
         h_rms = np.asarray(surface.h_rms, dtype=float)
         low, high = self.elastic.interval(surface)
-        farthest = np.minimum(high, FARTHEST * h_rms) + 8 * self.adhesion.range
+        farthest = np.minimum(high, FARTHEST * h_rms) + REACHES * self.adhesion.range
         if self.elastic.ends_at_h_max:
             return np.maximum(low, SMALLEST_GAP * h_rms), farthest
         return np.maximum(low, SMALLEST_GAP * h_rms), np.minimum(farthest, high)
@@ -278,7 +279,7 @@ class Adhesive(Theory):
             column = (-1, *(1,) * len(shape))
             net = force.reshape(column) - self._traction * attraction.reshape(column)
             return curve.log_knots.reshape(column), net
-        low, high = self._range_of_gaps(surface)
+        low, high = self.range_of_gaps(surface)
         share = np.linspace(0.0, 1.0, LOOKS).reshape(-1, *(1,) * len(shape))
         u = np.broadcast_to(low * (high / low) ** share, (LOOKS, *shape))
         return np.log(u), self.net(surface, u)
@@ -335,7 +336,7 @@ class Adhesive(Theory):
         node, weight = np.polynomial.legendre.leggauss(PARTING_NODES)
         share = ((node + 1) / 2).reshape(-1, *(1,) * free.ndim)
         weights = (weight / 2).reshape(share.shape)
-        width = self._range_of_gaps(surface)[1] - free
+        width = self.range_of_gaps(surface)[1] - free
         # denser towards small gaps, where the tension is
         u = free + width * share**3
         tension = -self.net(surface, u)

@@ -65,9 +65,8 @@ class AttractionCurve:
         its surface alive by it.
         """
         flat = u.ravel()
-        piece = np.searchsorted(self.knots, flat, side="right") - 1
-        inside = (piece >= 0) & (piece < len(self._is_made))
-        piece = np.where(inside, piece, 0)
+        inside = (flat >= self.knots[0]) & (flat <= self.knots[-1])
+        piece = np.searchsorted(self.knots[1:-1], flat, side="right")
         missing = inside & ~self._is_made[piece]
         if missing.any():
             self._make(np.unique(piece[missing]), direct)

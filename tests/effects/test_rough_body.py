@@ -1,6 +1,7 @@
 """Rough spheres and cylinders: Hertz, Greenwood and Tripp's problem and remark, laws of force, and code of them."""
 
 import ctypes
+import functools
 import math
 import shutil
 import subprocess
@@ -10,19 +11,25 @@ import pytest
 
 from generate.pages.simulations import spheres
 from mbma_tables import (
+    Adhesion,
+    Bodies,
     InputError,
     OutOfRangeError,
     Surface,
+    contact,
     greenwood_tripp,
     rough_contact,
 )
+from mbma_tables.bodies.adhesion import AdhesionInUnits
+from mbma_tables.effects.attracting_body import AttractingBody
 from mbma_tables.effects.force_law import plane_basis
 from mbma_tables.effects.rough_contact import CELLS
 from mbma_tables.export.code.law_code import law_files, law_text
 from mbma_tables.export.registry import targets
 from mbma_tables.export.rows.law_rows import describe_law
 from mbma_tables.islands.greenwood_tripp import height_integral
-from mbma_tables.theories import Theory, TheoryAnswer
+from mbma_tables.theories import Theory, TheoryAnswer, resolve
+from mbma_tables.theories.adhesion import with_adhesion
 
 FACE = Surface(hurst=0.8, q0=0.05, q1=1.5, h_rms=0.5, h_max=1.75, unit="um")
 
@@ -259,3 +266,65 @@ def test_boundary_elements_of_rough_spheres():
     assert seen["off"][wide].std() < 0.2
     assert np.abs(seen["area"][wide].mean()) < 0.1
     assert np.abs(seen["mean_radius"][wide].mean()) < 0.1
+
+
+# nearly smooth: the layer is a tenth of the range thick where it carries
+SMOOTH = Surface(0.8, q0=10.0, q1=80.0, h_rms=0.02, h_max=0.07)
+STICKY = Bodies(1.0, adhesion=Adhesion(0.02, 1.0))
+
+
+@functools.cache
+def work_of_parting():
+    free = contact(SMOOTH, STICKY, pressure=0.0, theory="calibrated")
+    return float(free.effective_work)
+
+
+def attracted(radius, **given):
+    return rough_contact(SMOOTH, radius, STICKY, theory="calibrated", **given)
+
+
+@pytest.mark.slow
+def test_small_stiff_spheres_part_at_the_tension_of_derjaguin_muller_toporov():
+    """2 pi w R where nothing is deformed, from which softness takes away."""
+    loads = np.array([1e-3, 0.0, -1e-3])
+    ball = attracted(0.1, force=loads)
+    limit = 2 * np.pi * work_of_parting() * 0.1
+    assert 0.99 * limit < ball.pull_off < limit
+    np.testing.assert_allclose(ball.force, loads, atol=1e-8)
+    assert not ball.valid.any()
+    assert "simulated" in " ".join(ball.reasons)
+    slope = (loads[0] - loads[2]) / (ball.approach[0] - ball.approach[2])
+    assert ball.stiffness[1] == pytest.approx(slope, rel=5e-3)
+    part = np.array([-1.01 * limit, -0.99 * ball.pull_off]) / ball.layer.E_star
+    with pytest.raises(OutOfRangeError, match="part"):
+        ball._body.approach_at(part[0])
+    assert ball._body.approach_at(part[1]) < ball.approach[2]
+
+
+@pytest.mark.slow
+def test_large_soft_spheres_part_at_the_tension_of_johnson_kendall_roberts():
+    """3/2 pi w R where the attraction is as short as nothing beside what it deforms."""
+    net = with_adhesion(
+        resolve("calibrated", SMOOTH),
+        AdhesionInUnits(0.02, 1.0, Adhesion(0.02, 1.0).shape, is_exponential=True),
+    )
+    over = []
+    for radius in (10.0, 3e4):
+        body = AttractingBody(None, radius, False, 0.0, SMOOTH, net.elastic, {}, 1.0, net=net, nodes=128)  # fmt: skip
+        over.append(body.pull_off / (np.pi * work_of_parting() * radius))
+    # Tabor's numbers of the spheres are 0.16 and 2.2
+    assert 2.0 > over[0] > 1.9
+    assert 1.5 < over[1] < 1.06 * 1.5
+
+
+def test_what_attracting_bodies_are_refused():
+    with pytest.raises(InputError, match="cylinders that attract"):
+        attracted(10.0, shape="cylinder", approach=0.0)
+    # without work nothing differs
+    none = Bodies(1.0, adhesion=Adhesion(0.0, 1.0))
+    ball, plain = (
+        rough_contact(SMOOTH, 50.0, bodies, theory="calibrated", approach=0.05)
+        for bodies in (none, 1.0)
+    )
+    assert ball.force == plain.force
+    assert ball.pull_off == plain.pull_off == 0

@@ -22,7 +22,6 @@ from mbma_tables import (
     Surface,
     contact,
     contact_law,
-    rough_contact,
     sensitivity,
 )
 from mbma_tables.common.errors import InputError, MissingError, OutOfRangeError
@@ -288,8 +287,6 @@ def test_nothing_drops_the_attraction():
     assert float(found.area[0]) == pytest.approx(
         pressed(STICKY, pressure="2 MPa").area, rel=1e-5
     )
-    with pytest.raises(InputError, match="attract"):
-        rough_contact(FACE, "5 mm", STICKY, force="1 N", theory="calibrated")
 
 
 def held_out():
