@@ -282,3 +282,74 @@ def test_rows_of_a_file_take_no_options_of_a_law(tmp_path):
         assert message in done.output
     done = run("export", "c-law", "--law", path, "--out", "-")
     assert "c-law is made from a surface or a joint, not from rows" in done.output
+
+
+# of which the numbers are fitted to the law, not as many as asked for
+FITTED = ("lethe", "mbdyn", "moose-pressure")
+HEAT = ["--conductivity", 0.3, "--conductivity-unit", "W/(m K)"]
+
+
+def text_in(content):
+    """Text of a file, with that of its parts where it is an archive."""
+    if content[:2] == b"PK":
+        held = zipfile.ZipFile(io.BytesIO(content))
+        content = b"".join(held.read(name) for name in held.namelist())
+    return content.decode("latin-1")
+
+
+@pytest.mark.parametrize("target", OF_ROWS)
+def test_rows_are_as_many_as_asked_for_and_headers_say_what_they_are(target, tmp_path):
+    """Validity, the error of each column and the command that writes the file again, in all of them."""
+    skip_without_package(target)
+    kind = OF_ROWS[target]
+    path = tmp_path / f"law{kind.end or '.txt'}"
+    length, stress = kind.units or ("mm", "MPa")
+    takes_heat = "conductivity" in kind.takes and kind.quantity != "film"
+    asked = [
+        *("--rows", 9, "--pressures", "1kPa:1MPa"),
+        *("--length-unit", length, "--stress-unit", stress),
+        *(HEAT if takes_heat and "solid_conductance" in kind.quantities else []),
+    ]
+    done = run("export", target, *SURFACE, *asked, "--out", path)
+    assert done.exit_code == 0, done.output
+    content = path.read_bytes()
+    curves = kind.read(content)
+    text = text_in(content)
+    assert "not valid below p = " in text
+    # in XML, whose comments have no two hyphens, one of them is %2D
+    command = f"mbma export {target} --surface concrete --E-star 13.3MPa"
+    assert command in text.replace("-%2D", "--")
+    assert "largest error" in text or "misfit" in text
+    # the closure of CalculiX beside conductances is a formula
+    of_rows = [
+        curve
+        for curve in curves
+        if target not in FITTED and (target, curve.name) != ("calculix", "pressure")
+    ]
+    for curve in of_rows:
+        assert curve.x.size == 9
+        if "pressure" in curve.name or "conductance" in curve.name:
+            # nothing is pressed and nothing conducts at first contact
+            assert (curve.x[0], curve.y[0]) == (0, 0)
+    stated = re.findall(r"\w+: 9 rows; largest error [^.;]*? \d\.\de-\d\d", text)
+    assert len({*stated}) >= len(of_rows)
+
+
+@pytest.fixture(scope="module")
+def conducting():
+    bodies = Bodies("13.3 MPa", conductivity="0.3 W/(m K)")
+    return contact_law(Surface.named("concrete"), bodies, "calibrated")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", [name for name in OF_ROWS if name not in FITTED])
+def test_the_error_that_is_asked_for_wins(target, conducting):
+    """There are as few rows as it needs, over a hundred times that of the default."""
+    skip_without_package(target)
+    made = export_law(conducting, target, ("100 kPa", "1 MPa"), rtol=0.2)
+    content = made[""] if isinstance(made, dict) else made
+    content = content.encode() if isinstance(content, str) else content
+    # of the quantity of the rows; columns beside it state their own
+    stated = re.search(r"largest error [^.;]*? (\d\.\de-\d\d)", text_in(content))
+    assert 0.02 < float(stated[1]) <= 0.2
+    assert all(curve.x.size < 9 for curve in OF_ROWS[target].read(content)[:1])

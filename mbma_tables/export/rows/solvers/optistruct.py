@@ -6,7 +6,7 @@ Conductances are PCONTHT 1 and TABLED1 3.
 import numpy as np
 
 from mbma_tables.export.law_table import Curve, LawTable, titled
-from mbma_tables.export.targets import CONDUCTANCES, STAY_WITHIN_ROWS, RowFormat
+from mbma_tables.export.targets import CONDUCTANCES, RowFormat
 from mbma_tables.export.text import number
 
 # columns of a long field, and of the first field of a line
@@ -74,7 +74,7 @@ optistruct = RowFormat(
     name="optistruct",
     program="OptiStruct",
     output="`PCONT`, `TABLES1`; with `--conductivity` also `PCONTHT`, `TABLED1`",
-    outside="not tested",
+    outside="continues the last slope, by its manual; not tested",
     tested=(
         "written according to the manual; pyNastran 1.4.1 parses TABLES1 and TABLED1, and "
         "ignores PCONT and PCONTHT, which it does not support"
@@ -82,6 +82,9 @@ optistruct = RowFormat(
     read=_read,
     mark="$",
     body={"pressure": _of_pressure, **dict.fromkeys(CONDUCTANCES, _of_heat)},
-    beyond=STAY_WITHIN_ROWS,
+    beyond=(
+        "By its manual OptiStruct continues the last slope beyond the last row, which was not "
+        "tested: stay within the range."
+    ),
     closure=True,
 )
