@@ -346,6 +346,10 @@ class Theory(abc.ABC):
         compared = tested.is_compared(surface, self.scatter_name(surface))
         return np.where(compared, scatter, np.nan)
 
+    def wide_scatter(self, surface: AnySurface, quantity: str) -> FloatArray:
+        """The part of its scatter that is of bands wider than those of all comparisons."""
+        return np.zeros(surface.shape)
+
     def law_curves(self, surface: AnySurface, rtol: float) -> Compression | None:
         """Curves for the law of one surface to a relative error; None: it is fitted to answers."""
         return None

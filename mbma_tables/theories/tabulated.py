@@ -245,6 +245,12 @@ class Tabulated(Theory):
             return original.scatter(surface, quantity, area)
         return np.full(np.broadcast_shapes(np.shape(area), surface.shape), np.nan)
 
+    def wide_scatter(self, surface: AnySurface, quantity: str) -> FloatArray:
+        original = self.stands_for
+        if original is not None:
+            return original.wide_scatter(surface, quantity)
+        return super().wide_scatter(surface, quantity)
+
     def provenance(self) -> tuple[str, ...]:
         """The table's function and file."""
         attributes = self.contents.attributes

@@ -98,12 +98,20 @@ def test_what_is_valid(theory, bodies, ratio, valid):
 
 def test_scatter_grows_with_the_band_and_by_every_route():
     found = []
+    with_hardness = []
     for ratio in (128, 128.01, 256, 500):
         face = Surface(0.8, 0.01, 0.01 * ratio, 1.0, 4.0)
         pressed = contact(face, ELASTIC, area=0.3, theory="calibrated")
         found.append(pressed.area_scatter)
         by_law = contact_law(face, ELASTIC, "calibrated").at(pressure=pressed.pressure)
         assert by_law.area_scatter == pytest.approx(pressed.area_scatter, rel=1e-3)
+        # a hardness, whose scatter was measured to 1:128, has no smaller one beyond
+        yielding = Bodies(1.0, hardness=0.1 * float(face.rms_gradient))
+        with_hardness.append(contact(face, yielding, area=0.1, theory="calibrated"))
+    stated = [float(one.scatter) for one in with_hardness]
+    wider = np.sqrt(stated[2] ** 2 - stated[0] ** 2)
+    assert wider == pytest.approx(0.05, rel=1e-6)
+    assert stated[0] <= stated[1] < stated[2] < stated[3]
     assert found[1] == pytest.approx(found[0], rel=1e-2)
     assert found[0] < found[2] < found[3]
     # spectra and batches alike

@@ -410,8 +410,7 @@ class Calibrated(Theory):
         """Scatter as of any theory; for maps with an addition to that of Gaussian ones."""
         if not self.by_heights(surface):
             stated = super().scatter(surface, quantity, area)
-            doublings = tested.beyond_all(surface)
-            wide = np.hypot(stated, WIDE_SCATTER.get(quantity, 0.0) * doublings**0.5)
+            wide = np.hypot(stated, self.wide_scatter(surface, quantity))
             if not surface.scans or np.isnan(wide).all():
                 return np.asarray(wide)
             assert isinstance(surface, MeasuredSurface)
@@ -428,6 +427,12 @@ class Calibrated(Theory):
             if surface.scans
             else stated
         )
+
+    def wide_scatter(self, surface: AnySurface, quantity: str) -> FloatArray:
+        if self.by_heights(surface):
+            return super().wide_scatter(surface, quantity)
+        most = WIDE_SCATTER.get(quantity, 0.0)
+        return np.asarray(most * tested.beyond_all(surface) ** 0.5)
 
     def scatter_name(self, surface: AnySurface) -> str:
         """With a map its own."""
