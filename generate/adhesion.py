@@ -41,6 +41,7 @@ RANGES = (0.03, 0.1, 0.3, 1.0)  # over h_rms
 TABOR = (0.1, 0.2, 0.35, 0.5)
 AREAS = (0.002, 0.006, 0.02, 0.06, 0.15, 0.3, 0.55, 0.8)  # of elastic loads, about
 TOLERANCE = 1e-6
+COVERED = 0.92  # share of contacts that two standard deviations are to cover
 GRADIENT = 0.1  # rms, of surfaces that theories are asked about
 HEAD = """\
 # Contacts with an exponential attraction by mbma_tables.theories.simulated.adhesive, by python -m generate adhesion.
@@ -226,11 +227,19 @@ def _answer(row: Any, name: str) -> list[Any]:
     "--data", type=click.Path(path_type=pathlib.Path), default=FILE, show_default=True
 )
 @click.option("--compare", is_flag=True, help="Print errors of the theory, no runs.")
-def adhesion(folder: pathlib.Path, data: pathlib.Path, compare: bool) -> None:
+@click.option(
+    "--scatter", is_flag=True, help="Print what covers held-out contacts, no runs."
+)
+def adhesion(
+    folder: pathlib.Path, data: pathlib.Path, compare: bool, scatter: bool
+) -> None:
     """Solve contacts with an attraction, half an hour on one core; `--compare` with the theory.
 
     Stopped and called again, it goes on where it was.
     """
+    if scatter:
+        _fit_scatter(pd.read_csv(data, comment="#"))
+        return
     if compare:
         _compare(pd.read_csv(data, comment="#"))
         return
@@ -271,3 +280,46 @@ def _compare(rows: pd.DataFrame) -> None:
                 f"{own_gap[chosen].abs().quantile(0.9):.3f}, of the change by it "
                 f"{area_grown[chosen].quantile(0.9):.3f} {gap_grown[chosen].quantile(0.9):.3f}"
             )
+
+
+def coverage(rows: pd.DataFrame) -> pd.DataFrame:
+    """Errors of the theory of numbers alone over the stated scatter, of contacts that are valid."""
+    pressed = rows[(rows.net_pressure > 0) & (rows.mean_separation > 0.01)]
+    found = answered(pressed, "calibrated", theory.THETA)
+    table = pressed.assign(
+        share=found.area,
+        area_error=np.log(found.area / under_compression(pressed)),
+        gap_error=np.log(found.gap / pressed.mean_separation),
+        area_scatter=found.area_scatter,
+        gap_scatter=found.gap_scatter / found.gap,
+    )
+    return table[found.valid]
+
+
+def _fit_scatter(rows: pd.DataFrame) -> None:
+    """Least additions by which two standard deviations cover the contacts of held-out surfaces."""
+    kept = theory.CELL_AREA, theory.CELL_GAP
+    theory.CELL_AREA = theory.CELL_GAP = 0.0
+    try:
+        table = coverage(rows)
+    finally:
+        theory.CELL_AREA, theory.CELL_GAP = kept
+    held_out = table[table.fitted == 0]
+    for name, shape in (("area", 1 - table.share), ("gap", np.sqrt(table.share))):
+        for hundredths in range(100):
+            scatter = np.hypot(table[f"{name}_scatter"], hundredths / 100 * shape)
+            within = table[f"{name}_error"].abs() < 2 * scatter
+            if within[held_out.index].mean() >= COVERED:
+                break
+        before = table[f"{name}_error"].abs() < 2 * table[f"{name}_scatter"]
+        for fitted, number in itertools.product((1, 0), TABOR):
+            chosen = (table.fitted == fitted) & (table.tabor == number)
+            if chosen.any():
+                click.echo(
+                    f"{name}, {hundredths / 100:g}, fitted {fitted}, Tabor {number:g}: {chosen.sum()} "
+                    f"valid, {before[chosen].mean():.0%} within two before, {within[chosen].mean():.0%} with it"
+                )
+        click.echo(
+            f"{name}: {within[table.fitted == 1].mean():.1%} of fitted, "
+            f"{within[held_out.index].mean():.1%} of held-out surfaces"
+        )

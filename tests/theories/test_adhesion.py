@@ -304,7 +304,7 @@ def test_held_out_simulations_from_numbers_alone():
     free of what that adds.
     """
     rows = held_out()
-    growth, gap = [], []
+    growth, gap, over_scatter = [], [], []
     for row in rows.itertuples():
         q0, q1 = 2 * np.pi * row.nl, 2 * np.pi * 256 / row.points
         face = Surface(row.hurst, q0, q1, row.h_rms, 4 * row.h_rms)
@@ -320,7 +320,15 @@ def test_held_out_simulations_from_numbers_alone():
         simulated = row.compressed_area / row.elastic_area
         growth.append(np.log(sticky.area / plain.area / simulated))
         gap.append(np.log(sticky.mean_separation / row.h_rms / row.gap_over_h_rms))
+        over_scatter.append(
+            (sticky.mean_separation - row.gap_over_h_rms * row.h_rms)
+            / sticky.separation_scatter
+        )
     assert len(growth) > 80
+    # of contacts that are of a kind that was compared
+    known = np.array(over_scatter)[np.isfinite(over_scatter)]
+    assert known.size > 40
+    assert np.mean(np.abs(known) < 2) > 0.92
     assert np.median(np.abs(growth)) < 0.015
     assert np.quantile(np.abs(growth), 0.9) < 0.05
     assert np.median(np.abs(gap)) < 0.06
