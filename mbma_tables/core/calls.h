@@ -882,7 +882,7 @@ static bool do_spectra_of(const argument *a, long long *answer) {
     return true;
 }
 
-/* First in both calls: waves and numbers of surfaces, and t0 of areas. */
+/* First in these calls: waves and numbers of surfaces, and t0 of areas. */
 enum { SPECTRA_WAVES, SPECTRA_NUMBERS, SPECTRA_T0, SPECTRA_INNER };
 enum { SPECTRA_ARGUMENTS = SPECTRA_INNER + INNER_ARGUMENTS };
 #define SPECTRA "D D d " INNER
@@ -924,6 +924,18 @@ static bool do_spectra_separation(const argument *a, long long *answer) {
     const mbma_inner inner = inner_of(&a[SPECTRA_INNER]);
     *answer = (long long)mbma_spectra_separation(&spectra, &inner, a[OWNER].count, a[OWNER].items,
                                                  a[FORCE].items, a[SEPARATION].items);
+    return true;
+}
+
+static bool do_spectra_energy(const argument *a, long long *answer) {
+    enum { RULE = SPECTRA_ARGUMENTS, OWNER, SEPARATION, ENERGY };
+    if (!are_spectra(a) || a[RULE].count != 2 * MBMA_ENERGY_NODES)
+        return false;
+    const mbma_spectra spectra = spectra_of(a);
+    const mbma_inner inner = inner_of(&a[SPECTRA_INNER]);
+    *answer = (long long)mbma_spectra_energy(&spectra, &inner, a[RULE].items, a[OWNER].count,
+                                             a[OWNER].items, a[SEPARATION].items,
+                                             a[ENERGY].items);
     return true;
 }
 
@@ -1079,6 +1091,7 @@ static bool do_yielding_planes(const argument *a, long long *answer) {
     FN(spectra_of, "Dn Dn D D7 " INNER "w w") \
     FN(spectra_contact, SPECTRA "Ln Dn wn wn wn") \
     FN(spectra_separation, SPECTRA "Ln Dn wn") \
+    FN(spectra_energy, SPECTRA "D Ln Dn wn") \
     FN(gap_flow, "D D D7 " INNER "D2 D Ln Dn wn") \
     FN(gaussian_levels, "Dn wn") \
     FN(bearing_shares, "Dn Dn wn wn") \

@@ -95,8 +95,10 @@ static double mean_gap(const bands *b, size_t first, double load, const mbma_law
         fall[k] = mbma_max(1.0 / below - 1.0, 0.0);
         share[k] = b->wave[band] / spread2 / (4.0 * gradient * sqrt(below));
     }
-    for (; count % CHUNK != 0; count++)
-        place[count] = fall[count] = share[count] = 0.0;
+    for (; count % CHUNK != 0; count++) {
+        place[count] = place[count - 1];
+        fall[count] = share[count] = 0.0;
+    }
     numbers->count = (double)count;
     numbers->first = 0.0;
     open_sum(sum, inner, numbers, place);
@@ -178,13 +180,20 @@ static void fill_gaps(const bands *b, double load, double alpha, const mbma_law_
 /* sum of share (h^3 - k)/(h^3 + k), and its derivative by ln k, in eight lanes. */
 static double balance(const gap_list *list, double k, double *slope) {
     double sum[LANES] = {0.0}, steep[LANES] = {0.0};
-    for (size_t begin = 0; begin < list->count; begin += LANES)
-        for (size_t l = 0; l < LANES; l++) {
-            const double share = list->share[begin + l], both = 1.0 / (list->cube[begin + l] + k);
-            const double part = k * both; /* of k in h^3 + k */
-            sum[l] = mbma_fma(share, 1.0 - 2.0 * part, sum[l]);
-            steep[l] = mbma_fma(share, part * (1.0 - part), steep[l]);
+    for (size_t begin = 0; begin < list->count; begin += GAPS) {
+        const double *const share = list->share + begin, *const cube = list->cube + begin;
+        double value[GAPS], change[GAPS];
+        for (size_t l = 0; l < GAPS; l++) {
+            const double part = k / (cube[l] + k);
+            value[l] = share[l] * (1.0 - 2.0 * part);
+            change[l] = share[l] * (part * (1.0 - part));
         }
+        for (size_t l = 0; l < GAPS; l += LANES)
+            for (size_t lane = 0; lane < LANES; lane++) {
+                sum[lane] += value[l + lane];
+                steep[lane] += change[l + lane];
+            }
+    }
     *slope = -2.0 * total_of(steep);
     return total_of(sum);
 }

@@ -10,6 +10,8 @@ enum { NODES = 8 };
 #define WIDEST 0.8            /* panel of ln g */
 #define BEGINNING 2e-18       /* part of a spectrum's width in which g rises to 1e-9 */
 #define DEEP 0.05             /* g, below which few nodes suffice where shares of u are small */
+#define LIGHTEST -600.0       /* ln F, below which there is no energy */
+#define CLOSED 1.3            /* ln F beyond which the gaps left have no energy */
 #define MOST_CHANGE 6.0       /* of ln of the spectrum in a panel */
 
 /* ---- wavenumbers ---- */
@@ -181,15 +183,17 @@ static bool fill_waves(const sum_of_parts *s, const double moments[3], wave_list
         }
     }
     /* what fills the last chunk has no share */
-    for (; list->count % CHUNK != 0; list->count++)
-        list->place[list->count] = list->fall[list->count] = list->share[list->count] = 0.0;
+    for (; list->count > 0 && list->count % CHUNK != 0; list->count++) {
+        list->place[list->count] = list->place[list->count - 1];
+        list->fall[list->count] = list->share[list->count] = 0.0;
+    }
     return list->count > 0;
 }
 
 /* ---- contacts ---- */
 
 /* ln F at a mean separation before the tail's factor by Newton's method, and d ln u/d ln F. */
-static double log_force_at(const own_sum *s, double u, double *slope) {
+static double log_force_at(own_sum *s, double u, double *slope) {
     const double log_u = mbma_log(u);
     double low = NO_FORCE, high = HEAVIEST;
     /* light loads, and those at which the sum ends like a Gaussian */
@@ -339,6 +343,44 @@ size_t mbma_spectra_separation(const mbma_spectra *spectra, const mbma_inner *in
             u[k] = mbma_min(separation_at(&own, goal, 100.0 * CLOSE, &taken), own.numbers->h_max);
         }
         bad += u[k] != u[k];
+    }
+    return bad;
+}
+
+/* Integral of force from u to h_max. Over the force F without end, before the tail's factor, u is
+ * a sum over wavenumbers, so that no node needs an inversion. Forces begin like the power 1.5 of
+ * what F is above that at h_max, and change by orders of magnitude; over the fourth root of that
+ * difference they are smooth. */
+static double energy_at(own_sum *s, double u, const double *rule) {
+    const mbma_spectrum_numbers *const numbers = s->numbers;
+    const double h_max = numbers->h_max;
+    double slope, sum = 0.0;
+    const double high = u > 0.0 ? mbma_min(log_force_at(s, u, &slope), CLOSED) : CLOSED;
+    const double begin = h_max < FARTHEST ? numbers->end + tail_at(s, h_max) : -INFINITY;
+    const double least = mbma_exp(mbma_max(begin, LIGHTEST)), width = mbma_exp(high) - least;
+    for (size_t k = 0; k < MBMA_ENERGY_NODES; k++) {
+        const double place = 0.5 * (1.0 + rule[k]), cube = place * place * place;
+        const double force = mbma_fma(width * cube, place, least), x = mbma_log(force);
+        const double gap = mbma_exp(log_u_of(s, x, &slope)), tail = tail_at(s, gap);
+        double steep;
+        const double share = mbma_exp(-tail) * mbma_ended(numbers->end + tail - x, &steep);
+        sum -= rule[MBMA_ENERGY_NODES + k] * cube * share * gap * slope;
+    }
+    return 2.0 * sum * width;
+}
+
+size_t mbma_spectra_energy(const mbma_spectra *spectra, const mbma_inner *inner,
+                           const double *rule, size_t n, const int64_t *owner, const double *u,
+                           double *energy) {
+    int64_t opened = -1;
+    size_t bad = 0;
+    own_sum own;
+    for (size_t k = 0; k < n; k++) {
+        const bool good = open_owner(spectra, inner, owner[k], &opened, &own) && u[k] >= 0.0;
+        energy[k] = good ? 0.0 : NAN;
+        if (good && u[k] < mbma_min(own.numbers->h_max, FARTHEST))
+            energy[k] = energy_at(&own, u[k], rule);
+        bad += energy[k] != energy[k];
     }
     return bad;
 }

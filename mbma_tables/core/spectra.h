@@ -59,6 +59,14 @@ size_t mbma_spectra_contact(const mbma_spectra *spectra, const mbma_inner *inner
 size_t mbma_spectra_separation(const mbma_spectra *spectra, const mbma_inner *inner, size_t n,
                                const int64_t *owner, const double *force, double *u);
 
+enum { MBMA_ENERGY_NODES = 40 };
+
+/* Integrals of force from u to h_max, over A0 E* g h_rms. `rule` has Gauss's nodes on [-1, 1] and
+ * their weights, MBMA_ENERGY_NODES of each. */
+size_t mbma_spectra_energy(const mbma_spectra *spectra, const mbma_inner *inner,
+                           const double *rule, size_t n, const int64_t *owner, const double *u,
+                           double *energy);
+
 /* Of the flow: contact fraction from which gaps do not percolate, and the power of smaller ones by
  * which contact obstructs. */
 typedef struct {

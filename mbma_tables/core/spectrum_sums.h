@@ -17,6 +17,7 @@ enum {
 #define HEAVIEST 2.95   /* ln F from which u is below 1e-317 */
 #define CLOSE 1e-8      /* of ln F: the next error would be about the square of this one */
 #define NO_FORCE -1e300 /* ln F */
+#define SPARE_CELLS 16  /* for the following steps of Newton's method */
 
 /* ---- spectra ---- */
 
@@ -77,38 +78,53 @@ MBMA_INLINE bool read_parts(size_t count, const double *laws, sum_of_parts *s) {
 
 /* ---- sums ---- */
 
-/* A surface that entries are computed of. */
+/* A surface that entries are computed of. Its polynomials are there from a cell on, since light
+ * loads alone need those of the first cells. */
 typedef struct {
     const mbma_inner *inner;
     const mbma_spectrum_numbers *numbers;
     const double *place, *fall, *share;
-    size_t count;
-    double p[MOST_CELLS * TERMS];
+    size_t count, first_cell;
+    double least_place, p[MOST_CELLS * TERMS];
 } own_sum;
 
 MBMA_INLINE void open_sum(own_sum *s, const mbma_inner *inner, const mbma_spectrum_numbers *numbers,
                      const double *waves) {
-    const double less = numbers->narrowness - inner->narrowness;
     s->inner = inner;
     s->numbers = numbers;
     s->count = (size_t)numbers->count;
     s->place = waves + (size_t)numbers->first;
     s->fall = s->place + s->count;
     s->share = s->fall + s->count;
-    for (size_t k = 0; k < inner->cells * TERMS; k++)
+    s->first_cell = inner->cells;
+    s->least_place = INFINITY;
+    for (size_t k = 0; k < s->count; k++)
+        s->least_place = mbma_min(s->least_place, s->place[k]);
+}
+
+/* Polynomials of all cells that a force needs. */
+MBMA_INLINE void fill_cells(own_sum *s, double from) {
+    const mbma_inner *const inner = s->inner;
+    const double last = (double)(inner->cells - 1), less = s->numbers->narrowness - inner->narrowness;
+    const double first = mbma_held(from + s->least_place, 0.0, last);
+    if ((size_t)first >= s->first_cell)
+        return;
+    const size_t begin = TERMS * (size_t)mbma_max(first - SPARE_CELLS, 0.0);
+    for (size_t k = begin; k < s->first_cell * TERMS; k++)
         s->p[k] = mbma_fma(less, inner->slopes[k], inner->polynomials[k]);
+    s->first_cell = begin / TERMS;
 }
 
 /* The inner integral of some wavenumbers at places among the cells, and its derivative by these. */
 MBMA_INLINE void inner_integrals(const own_sum *s, const double *restrict place, double from,
                             double *restrict value, double *restrict slope) {
     const double *const restrict p = s->p;
-    const double last = (double)(s->inner->cells - 1);
+    const double first = (double)s->first_cell, last = (double)(s->inner->cells - 1);
     int32_t word[CHUNK];
     double t[CHUNK];
     for (size_t k = 0; k < CHUNK; k++) {
         const double at = mbma_min(from + place[k], last + 1.0);
-        const double cell = (double)(int32_t)mbma_held(at, 0.0, last);
+        const double cell = (double)(int32_t)mbma_held(at, first, last);
         word[k] = (int32_t)cell * TERMS;
         t[k] = 2.0 * (at - cell) - 1.0;
     }
@@ -126,9 +142,10 @@ MBMA_INLINE double total_of(const double sum[LANES]) {
 }
 
 /* ln u of a surface without end, before the tail's factor, and its derivative by ln F. */
-MBMA_INLINE double log_u_of(const own_sum *s, double log_force, double *slope) {
+MBMA_INLINE double log_u_of(own_sum *s, double log_force, double *slope) {
     const double square = 2.0 * mbma_exp(2.0 * log_force), rate = s->inner->rate;
     double sum[LANES] = {0.0}, steep[LANES] = {0.0};
+    fill_cells(s, log_force * rate);
     for (size_t begin = 0; begin < s->count; begin += CHUNK) {
         const double *const fall = s->fall + begin, *const share = s->share + begin;
         double value[CHUNK], by_place[CHUNK];
@@ -155,7 +172,7 @@ MBMA_INLINE double tail_at(const own_sum *s, double u) { return s->numbers->tail
 
 /* u where ln F before the tail's factor, less what that takes, is `goal`: by Newton's method from a
  * guess of what it takes, which is renewed, until a step of ln F is `close`. */
-MBMA_INLINE double separation_at(const own_sum *s, double goal, double close, double *taken) {
+MBMA_INLINE double separation_at(own_sum *s, double goal, double close, double *taken) {
     double low = -800.0, high = HEAVIEST, u = 0.0, slope, x = mbma_min(goal + *taken, HEAVIEST);
     for (int step = 0; step < MOST_STEPS && goal < HEAVIEST; step++) {
         u = mbma_exp(log_u_of(s, x, &slope));

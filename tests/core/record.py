@@ -192,7 +192,9 @@ def use():
     contact(many, mean_separation=1.0, theory="calibrated")
     # outside the calibrated table
     beyond = Surface(0.05, 1.0, 30.0, 1.0, 3.0)
-    assert contact(beyond, pressure=[0.01, 0.1], theory="calibrated").leakage.K.all()
+    pressed = contact(beyond, pressure=[0.01, 0.1], theory="calibrated")
+    assert pressed.leakage.K.all()
+    assert pressed.energy.all()
 
 
 if __name__ == "__main__":

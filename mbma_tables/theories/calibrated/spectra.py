@@ -35,6 +35,7 @@ RATE = 16.0
 TERMS = 6
 # surfaces whose wavenumbers are found in one call, in room that is more than enough
 TOGETHER = 64
+ENERGY_NODES = 40  # of forces on the way to h_max
 COUNT, FIRST_WORD, WORD_STEP = 0, 1, 3  # places of numbers, and rows of a wavenumber
 
 
@@ -75,6 +76,12 @@ def inner_integral(
     polynomials = a * parts[0] + b * parts[1] + (1 - a - b) * parts[2]
     slopes = constants.weight_slope * (parts[0] - parts[2])
     return polynomials.ravel(), slopes.ravel(), np.array([FIRST, RATE, NARROWNESS])
+
+
+@shared()
+def energy_rule() -> FloatArray:
+    """Gauss's nodes on [-1, 1] and their weights, by which the core integrates forces."""
+    return np.concatenate(np.polynomial.legendre.leggauss(ENERGY_NODES))
 
 
 class Spectra:
@@ -136,6 +143,11 @@ class Spectra:
     def contacts(self, columns: tuple[Any, FloatArray]) -> FloatArray:
         """Rows of force, area and -dF/du by owners, numbers from 0, and u [h_rms], as of a `Table`."""
         return self._answers(core.spectra_contact, columns, 3)
+
+    def energies(self, columns: tuple[Any, FloatArray]) -> FloatArray:
+        """Integrals of force from u to h_max, over h_rms, by owners and u [h_rms]."""
+        loop = functools.partial(core.spectra_energy, *self._found, energy_rule())
+        return filled(loop, columns, 1)[0]
 
     def separations(self, columns: tuple[Any, FloatArray]) -> FloatArray:
         """A row of u [h_rms] by owners and forces over A0 E* g, positive."""

@@ -59,10 +59,10 @@ WIDE_SCATTER = {"area": 0.01, "pressure": 0.05, "stiffness": 0.08}
 LIKE_SCANS = 1e-3, 0.9  # A/A0 at which scans are compared
 MANY = 1000  # entries for which polynomials of one surface are made
 ROUNDING = 1e-14  # rounding of a separation beside h_max
-# nodes of the rule for energies, whose error is below 6e-9 where h_max/h_rms is at most the
-# first of these numbers and u/h_max at least the second; there the table errs by more
+# nodes of the rule for energies of surfaces of the table, whose error is below 6e-9 where
+# u/h_max is at least CLOSED; below, the table errs by more
 NODES = 48
-RULE_COVERS = 10.0, 1e-6
+CLOSED = 1e-6
 TOGETHER = 2**17  # forces in memory at once
 
 
@@ -89,7 +89,8 @@ class Batch:
         h_max, h_rms, gradient, alpha = (
             np.asarray(getattr(surface, name), float).ravel() for name in names
         )
-        self.shape, self.h_rms, self.gradient = surface.shape, h_rms, gradient
+        self.shape, self.h_max = surface.shape, h_max
+        self.h_rms, self.gradient = h_rms, gradient
         self.rows = np.arange(h_rms.size)
         heights = h_max / h_rms
         table = calibrated_table.shipped()
@@ -150,6 +151,47 @@ class Batch:
         out[2] *= gradient
         out[2] /= h_rms
         return out.reshape(3, *shape)
+
+    def energy(self, u: FloatArray) -> FloatArray:
+        """Integrals of force from mean separations to h_max, both lengths."""
+        flat, owner, shape, own = self.placed(u)
+        covered = self.covered[owner]
+        if covered.all():
+            return self._energy_by_table(flat, owner).reshape(shape)
+        energy = np.empty(flat.size)
+        some = np.flatnonzero(covered)
+        energy[some] = self._energy_by_table(flat[some], owner[some])
+        some = np.flatnonzero(~covered)
+        some = some[np.argsort(owner[some], kind="stable")]
+        number = owner[some]
+        h_rms = self.h_rms[number]
+        found = self.spectra.energies((self.number[number], flat[some] / h_rms))
+        energy[some] = found * self.gradient[number] * h_rms
+        return energy.reshape(shape)
+
+    def _energy_by_table(self, u: FloatArray, owner: NDArray[np.intp]) -> FloatArray:
+        # towards full contact force is smooth over the root of u, and beside h_max, where it
+        # is a power of what is left, over the root of that
+        nodes, weights = np.polynomial.legendre.leggauss(NODES)
+        h_rms = self.h_rms[owner]
+        h_max = self.h_max[owner]
+        last = np.sqrt(np.sqrt(h_max))
+        width = last - np.sqrt(np.sqrt(u))
+        energy = np.zeros(u.size)
+        step = max(1, TOGETHER // max(u.size, 1))
+        for start in range(0, NODES, step):
+            some = slice(start, start + step)
+            place = 0.5 * (1 + nodes[some, None])
+            root = last - width * place**2
+            x = np.minimum(root**4, h_max) / h_rms
+            number = np.ascontiguousarray(np.broadcast_to(owner, x.shape)).ravel()
+            force = self.contacts((number, x.ravel()))[0].reshape(x.shape)
+            # one after the other, so that sums do not depend on how many there are
+            for weight, one in zip(
+                weights[some], force * 4 * root**3 * place, strict=True
+            ):
+                energy += weight * one
+        return energy * width * self.gradient[owner]
 
     def separation(self, owner: Any, loads: FloatArray) -> FloatArray:
         """Mean separations over h_rms at forces over A0 E* g; infinite without a force."""
@@ -338,43 +380,20 @@ class Calibrated(Theory):
         )
 
     def energy(self, surface: AnySurface, mean_separation: FloatArray) -> FloatArray:
-        """Elastic energy over A0 E* [length], by a rule of a fixed number of forces but for high or closed surfaces."""
+        """Elastic energy over A0 E* [length], by rules of a fixed number of forces but for closed surfaces."""
         if isinstance(surface, MeasuredSurface):
             return super().energy(surface, mean_separation)
         u = np.asarray(mean_separation, float)
         h_max = np.asarray(surface.h_max)
-        found = self._energy_by_rule(surface, np.minimum(u, h_max))
-        highest, closest = RULE_COVERS
-        is_high = h_max > highest * np.asarray(surface.h_rms)
-        rest = np.flatnonzero(
-            np.broadcast_to(is_high | (u < closest * h_max), found.shape)
-        )
+        batch = _bound(surface, u)
+        found = batch.energy(np.minimum(u, h_max))
+        is_closed = batch.covered.reshape(surface.shape) & (u < CLOSED * h_max)
+        rest = np.flatnonzero(np.broadcast_to(is_closed, found.shape))
         if rest.size:
             others = select(surface, found.shape, rest)
             gaps = entries_at(u, found.shape, rest)
             found.ravel()[rest] = super().energy(others, gaps)
         return found
-
-    def _energy_by_rule(self, surface: AnySurface, u: FloatArray) -> FloatArray:
-        # towards full contact force is smooth over the root of u, and beside h_max, where it
-        # is a power of what is left, over the root of that
-        nodes, weights = np.polynomial.legendre.leggauss(NODES)
-        last = np.sqrt(np.sqrt(surface.h_max))
-        width = last - np.sqrt(np.sqrt(u))
-        batch = _bound(surface, u)
-        energy = np.zeros(width.shape)
-        step = max(1, TOGETHER // max(width.size, 1))
-        for start in range(0, NODES, step):
-            some = slice(start, start + step)
-            place = 0.5 * (1 + nodes[some].reshape(-1, *[1] * width.ndim))
-            root = last - width * place**2
-            force = batch.contact(np.minimum(root**4, surface.h_max))[0]
-            # one after the other, so that sums do not depend on how many there are
-            for weight, one in zip(
-                weights[some], force * 4 * root**3 * place, strict=True
-            ):
-                energy += weight * one
-        return np.asarray(energy * width)
 
     def heights(self, surface: AnySurface) -> Any:
         """Heights of a map, or Gaussian."""

@@ -473,6 +473,9 @@ class Unloading(Theory):
         """Mean separations of the elastic contact at the forces of contacts at u, but the lightest."""
         peak, tail = self._curve(surface)
         inside = peak.remembered & (u > peak.mean_separation) & (u < tail.first)
+        beyond = np.where(u < tail.first, peak.elastic_separation, tail.elastic_separation)
+        if not inside.any():
+            return beyond
         low, end = peak.elastic_separation, tail.elastic_last
         given = tail.last - u, inside, low, end, tail.last
         (goal, is_wanted, lows, ends, last), shape = rows(*given)
@@ -493,7 +496,6 @@ class Unloading(Theory):
         missed = search.run(curve_of, is_wanted > 0)
         if missed.any():
             raise unfinished(missed.reshape(shape), "the elastic contact of a branch")
-        beyond = np.where(u < tail.first, low, tail.elastic_separation)
         return np.where(inside, search.gap.reshape(shape), beyond)
 
     def at_force(
@@ -504,7 +506,9 @@ class Unloading(Theory):
         # at the largest pressure both branches meet
         other = pressure != peak.pressure
         heavy = other & ((pressure > peak.pressure) | ~peak.remembered)
-        v = self.branch_theory.mean_separation_at(surface, "pressure", pressure)
+        v = peak.elastic_separation
+        if other.any():
+            v = self.branch_theory.mean_separation_at(surface, "pressure", pressure)
         s = np.minimum(pressure / peak.pressure, 1.0)
         tail = self.tail(surface)
         with np.errstate(divide="ignore"):

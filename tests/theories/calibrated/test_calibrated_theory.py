@@ -11,6 +11,7 @@ import xarray as xr
 from helpers import contact_of, random_map
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from scipy import integrate
 from scipy.special import erf
 
 from generate.boundary_elements.evidence import cases, evidence
@@ -464,21 +465,42 @@ def test_energies_take_few_forces(top, monkeypatch):
     )
     shares = np.array([1e-9, 1e-6, 1e-4, 1e-2, 0.03, 0.1, 0.3, 0.6, 0.9, 0.99])
     u = np.repeat(top * shares[:, None], 12, axis=1)
-    forces = []
-    of_batch = Batch.contact
-
-    def counted(batch, gaps):
-        forces.append(np.broadcast(gaps, batch.h_rms.reshape(batch.shape)).size)
-        return of_batch(batch, gaps)
-
     expected = Theory.energy(THEORY, surfaces, u)
-    monkeypatch.setattr(Batch, "contact", counted)
     np.testing.assert_allclose(THEORY.energy(surfaces, u), expected, rtol=6e-9)
-    forces.clear()
+
+    # not one force of that quadrature, but of gaps that are nearly closed
+    monkeypatch.delattr(Batch, "contact")
     found = THEORY.energy(surfaces, u[1:])
-    assert sum(forces) <= 50 * found.size
     # sums do not depend on the other entries
     np.testing.assert_array_equal(THEORY.energy(surfaces, u[4]), found[3])
+
+
+@pytest.mark.parametrize(
+    "bands",  # hurst, q0, q1, h_rms
+    [
+        ((0.8, 0.01, 0.8, 0.4), (0.7, 0.03, 3.0, 0.2)),
+        ((0.6, 0.01, 0.05, 1.0), (0.9, 0.5, 30.0, 0.05)),  # with a gap
+        ((0.95, 0.02, 500.0, 0.1), (0.1, 0.01, 0.2, 0.3)),
+    ],
+)
+def test_energies_of_two_bands_are_integrals_of_their_force(bands):
+    one, other = (Surface(*numbers, 4 * numbers[-1]) for numbers in bands)
+    both = one.combined(other, 1e8)
+    u = float(both.h_rms) * np.array([0.003, 0.05, 0.5, 1.5, 3.0])
+
+    def of_root(root):
+        # forces begin like the power 1.5 of what h_max is above the gap
+        gap = np.asarray(both.h_max - root * root)
+        return 2 * root * float(THEORY.answer(both, gap).pressure)
+
+    expected = [
+        integrate.quad(of_root, 0.0, np.sqrt(both.h_max - gap), epsrel=1e-10, limit=99)[0]
+        for gap in u
+    ]
+    found = THEORY.energy(both, u)
+    np.testing.assert_allclose(found, expected, rtol=3e-9)
+    batch = one.combined(other, np.full((2, 1), 1e8))
+    np.testing.assert_array_equal(THEORY.energy(batch, u), np.stack([found, found]))
 
 
 def test_full_contact_holds_all_energy():
