@@ -154,7 +154,7 @@ class Batch:
 
     def energy(self, u: FloatArray) -> FloatArray:
         """Integrals of force from mean separations to h_max, both lengths."""
-        flat, owner, shape, own = self.placed(u)
+        flat, owner, shape, _ = self.placed(u)
         covered = self.covered[owner]
         if covered.all():
             return self._energy_by_table(flat, owner).reshape(shape)
