@@ -473,7 +473,9 @@ class Unloading(Theory):
         """Mean separations of the elastic contact at the forces of contacts at u, but the lightest."""
         peak, tail = self._curve(surface)
         inside = peak.remembered & (u > peak.mean_separation) & (u < tail.first)
-        beyond = np.where(u < tail.first, peak.elastic_separation, tail.elastic_separation)
+        beyond = np.where(
+            u < tail.first, peak.elastic_separation, tail.elastic_separation
+        )
         if not inside.any():
             return beyond
         low, end = peak.elastic_separation, tail.elastic_last
