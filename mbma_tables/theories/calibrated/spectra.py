@@ -147,7 +147,8 @@ class Spectra:
     def energies(self, columns: tuple[Any, FloatArray]) -> FloatArray:
         """Integrals of force from u to h_max, over h_rms, by owners and u [h_rms]."""
         loop = functools.partial(core.spectra_energy, *self._found, energy_rule())
-        return filled(loop, columns, 1)[0]
+        energies: FloatArray = filled(loop, columns, 1)[0]
+        return energies
 
     def separations(self, columns: tuple[Any, FloatArray]) -> FloatArray:
         """A row of u [h_rms] by owners and forces over A0 E* g, positive."""

@@ -191,7 +191,7 @@ class Batch:
                 weights[some], force * 4 * root**3 * place, strict=True
             ):
                 energy += weight * one
-        return energy * width * self.gradient[owner]
+        return np.asarray(energy * width * self.gradient[owner])
 
     def separation(self, owner: Any, loads: FloatArray) -> FloatArray:
         """Mean separations over h_rms at forces over A0 E* g; infinite without a force."""
