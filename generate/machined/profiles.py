@@ -181,6 +181,44 @@ def rows_of(
                 yield dict(zip(COLUMNS, (*row, *texts, int(valid)), strict=True))
 
 
+@dataclasses.dataclass(frozen=True)
+class Reduced:
+    """A number of one trace beside that of its map.
+
+    Attributes
+    ----------
+    number : str
+        "h_rms" or "rms_gradient".
+    sides : int
+        Length of the trace, in sides of the map.
+    waves : float
+        Longest wavelengths that it holds.
+    ratio : float
+        The number over that of the map.
+    deviation : float
+        The standard error that is stated for it, relative.
+    """
+
+    number: str
+    sides: int
+    waves: float
+    ratio: float
+    deviation: float
+
+
+def reduced(one: Simulated) -> Iterator[Reduced]:
+    """What one trace of each length in `TRACES` says of a map, and its stated error."""
+    true = squares(one.heights - one.heights.mean(), one.steps)
+    for sides in dict.fromkeys(length for length, _ in TRACES):
+        surface = surface_of(one, sides, 1, "one")
+        (stated,) = (step for step in surface.provenance if step["step"] == "errors")
+        length = sides * one.heights.shape[0] * one.steps[0]
+        waves = length * float(surface.longest) / (2 * np.pi)
+        for number, square in zip(("h_rms", "rms_gradient"), true, strict=True):
+            ratio = float(getattr(surface, number)) / float(np.sqrt(square))
+            yield Reduced(number, sides, waves, ratio, stated[number])
+
+
 def read(path: pathlib.Path = FILE) -> list[dict[str, str]]:
     """The rows of the file."""
     with gzip.open(path, "rt", encoding="utf-8", newline="") as file:

@@ -16,7 +16,7 @@ from generate.boundary_elements.evidence import Simulated
 from generate.boundary_elements.evidence import simulated as simulated_surfaces
 from generate.boundary_elements.surfaces import TRAINING, Recipe, heights
 from generate.files import ROOT, dataset, read_csv, to_csv
-from generate.machined import artefacts, makers, raw_maps
+from generate.machined import artefacts, makers, profiles, raw_maps
 from generate.machined.campaign import FORMS
 from generate.machined.evaluation import by_family, covered, families_left_out, yielding
 from generate.machined.unseen import UNSEEN
@@ -307,7 +307,37 @@ def maps() -> Measured:
         "artefacts": artefacts_by_group(),
         "raw_maps": raw_maps_by_truth(),
     }
-    return parts, {}
+    return parts, {"docs/figures/profiles.svg": draw_profiles()}
+
+
+def draw_profiles() -> Figure:
+    """Height and gradient of single traces over those of their maps, with stated errors."""
+    chosen = itertools.chain(profiles.machined(5, 2), profiles.elastic(30, 2))
+    isotropic = [one for one in chosen if one.family in profiles.ISOTROPIC]
+    found = list(itertools.chain.from_iterable(map(profiles.reduced, isotropic)))
+    titles = {"h_rms": "$h_{rms}$", "rms_gradient": "rms gradient"}
+    figure, axes = panels(1, 2, (9, 3.6), sharex=True, sharey=True)
+    for axis, (number, title) in zip(axes, titles.items(), strict=True):
+        own = [each for each in found if each.number == number]
+        for sides in sorted({each.sides for each in own}):
+            some = [each for each in own if each.sides == sides]
+            misses = np.array([(each.ratio - 1) / each.deviation for each in some])
+            within = [(np.abs(misses) < most).mean() for most in (1, 2)]
+            axis.errorbar(
+                [each.waves for each in some],
+                [each.ratio for each in some],
+                [each.deviation for each in some],
+                fmt="o",
+                markersize=3,
+                linewidth=0.8,
+                label=f"{sides} sides: {within[0]:.0%} and {within[1]:.0%} within 1 and 2",
+            )
+        axis.axhline(1.0, color="black", linewidth=0.8)
+        axis.set_xscale("log")
+        axis.set_xlabel("longest wavelengths in the trace")
+        axis.set_title(f"{title} of a trace over that of its map", fontsize="medium")
+        axis.legend(fontsize="small")
+    return figure
 
 
 def artefacts_by_group() -> str:

@@ -51,7 +51,10 @@ OVERLAP = (
 MIN_POWER = (
     1e-24  # power over that of the strongest wavelength: lower values are rounding
 )
-FORM = 0.5  # share of the height variance in a tilt or a bow above which it is reported
+# share of the height variance in a tilt or a bow above which it is reported; a bow is from
+# `artefacts.LEAST_BOW` on where nobody chose what to subtract, since at half an h_rms it
+# changes areas by up to 50%, and half of the machined maps have as much by their own waves
+FORM = 0.5
 # standard deviations of an outlier; share of points up to which they are reported
 USUAL_LIMIT = 10.0
 FEW = 1e-3
@@ -331,29 +334,38 @@ def _flattened(treated: Treated, mode: str | None) -> Treated:
     description = f"{trend} subtracted" + (
         f": h_rms {before:.4g} before, {after:.4g} after" if trend != "mean" else ""
     )
-    for more, form, remedy in (
-        ((1, "tilt", "plane"), (2, "bow", "quadratic")) if degree is not None else ()
-    ):
-        share = (
-            1 - (float(np.std(without_polynomial(flat, more))) / after) ** 2
-            if more > (degree or 0)
-            else 0.0
-        )
-        if share > FORM:
-            description += (
-                f"; a {form} has {share:.0%} of the height variance: detrend={remedy!r} "
-                "removes it"
-            )
-            break
+    # what to subtract was nobody's choice
+    is_default = mode is None and not treated.periodic and flat.ndim == 2
+    bow = artefacts.bow(flat) if is_default else None
+    if degree is not None:
+        # a doubt says the same
+        is_slight = is_default and bow is None
+        least_bow = artefacts.LEAST_BOW if is_slight else FORM
+        description += _form_left(flat, degree, least_bow)
     removed = None if trend in ("mean", "plane") else heights - flat
     treated = treated.after(
         flat, "detrend", description, mode=trend, h_rms_before=before, h_rms_after=after
     )
-    # what to subtract was nobody's choice
-    is_default = mode is None and not treated.periodic and flat.ndim == 2
-    bow = artefacts.bow(flat) if is_default else None
     treated = treated if bow is None else treated.with_artefact(bow)
     return dataclasses.replace(treated, form=removed)
+
+
+def _form_left(flat: FloatArray, degree: int, least_bow: float) -> str:
+    """What is told of a tilt or a bow that a trend of that degree leaves in the heights."""
+    variance = float(np.var(flat))
+    for more, form, remedy, least in (
+        (1, "tilt", "plane", FORM),
+        (2, "bow", "quadratic", least_bow),
+    ):
+        if more <= degree:
+            continue
+        share = 1 - float(np.var(without_polynomial(flat, more))) / variance
+        if share > least:
+            return (
+                f"; a {form} has {share:.0%} of the height variance: detrend={remedy!r} "
+                "removes it"
+            )
+    return ""
 
 
 def _with_high_place(treated: Treated) -> Treated:

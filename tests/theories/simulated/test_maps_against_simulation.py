@@ -218,6 +218,31 @@ def test_laws_of_maps_from_files(name):
     )
 
 
+# files of instruments among the examples of SurfaceTopography, with what its own tests hold of
+# them: points, sides, unit, and whether points are undefined
+INSTRUMENTS = {
+    "opd-1.opd": ((640, 480), (0.125909140, 0.094431855), "mm", True),
+    "plux-1.plux": ((2583, 1023), (1666.034951, 659.83498), "um", True),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", INSTRUMENTS)
+def test_files_of_instruments(name):
+    path = maps.path_of(name)
+    if path is None:
+        pytest.skip("no reference maps: set MBMA_REFERENCE_MAPS to their folder")
+    points, sides, unit, has_holes = INSTRUMENTS[name]
+    surface = Surface.from_map(path, fill="harmonic", outliers=10, detrend="quadratic")
+    assert surface.map.heights.shape == points
+    steps = np.divide(sides, points)
+    np.testing.assert_allclose(surface.map.steps, steps, rtol=1e-6)
+    assert surface.unit == unit
+    filled = [step for step in surface.provenance if step["step"] == "fill"]
+    assert bool(filled) == has_holes
+    assert contact(surface, area=0.1).pressure > 0
+
+
 @pytest.mark.slow
 def test_held_out_maps_that_are_stretched_or_not_gaussian():
     seen = set()
