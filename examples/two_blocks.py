@@ -10,8 +10,10 @@ import subprocess
 import tempfile
 
 import click
+from matplotlib.figure import Figure
 
 from mbma_tables import Joint
+from mbma_tables.common.plots import new_figure, to_picture
 
 SIDE = 10.0
 HEIGHT = 1.0
@@ -142,8 +144,41 @@ def compared() -> list[tuple[str, float, float]]:
     return rows
 
 
-if __name__ == "__main__":
-    for name, simulated, law in compared():
+def draw(rows: list[tuple[str, float, float]]) -> Figure:
+    """Temperatures through both blocks, by CalculiX and by the law, beside those of a perfect contact."""
+    heights = [0.0, HEIGHT, HEIGHT, 2 * HEIGHT]
+    simulated, law = ([0.0, rows[0][k], rows[1][k], HOT] for k in (1, 2))
+    perfect = HOT / (1 + K[0] / K[1])
+    figure = new_figure(5.5, 3.6)
+    axes = figure.subplots()
+    axes.plot(heights, law, label="by the law of the joint")
+    axes.plot(heights, simulated, "ko", label="CalculiX")
+    axes.plot(
+        [0.0, HEIGHT, 2 * HEIGHT], [0.0, perfect, HOT], "--", label="perfect contact"
+    )
+    axes.set(xlabel="height: steel, then aluminium [mm]", ylabel="temperature")
+    axes.grid(alpha=0.3)
+    axes.legend()
+    return figure
+
+
+@click.command()
+@click.option(
+    "--out",
+    type=click.Path(path_type=pathlib.Path, dir_okay=False),
+    help="Draw to this file, .png or .svg.",
+)
+def command(out: pathlib.Path | None) -> None:
+    """Two heated and sheared blocks in CalculiX."""
+    rows = compared()
+    for name, simulated, law in rows:
         click.echo(
             f"{name}: CalculiX {simulated:.4g}, law {law:.4g}, difference {simulated / law - 1:+.2%}"
         )
+    if out:
+        picture = to_picture(draw(rows), out.suffix[1:], dpi=100, outlines=True)
+        out.write_bytes(picture)
+
+
+if __name__ == "__main__":
+    command()

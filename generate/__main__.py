@@ -49,6 +49,8 @@ PARTS = {
     "readme": ("README.md", "pages.library:readme"),
     "tables": ("docs/tables.md", "pages.library:tables"),
     "theories": ("docs/theories.md", "pages.library:theories"),
+    "surfaces": ("docs/surfaces.md", "pages.surfaces:sensitivities"),
+    "howto/cutoff": ("docs/howto/cutoff.md", "pages.surfaces:cutoff"),
     "howto/trust": ("docs/howto/trust.md", "pages.trust:measure"),
     "calibrated": ("docs/fidelity.md", "pages.laws:calibrated"),
     "constants": ("docs/theories.md", "pages.laws:constants"),

@@ -31,11 +31,19 @@ from generate.leakage_law import (
     noise_floor,
     summary,
 )
-from generate.page import Cell, Measured, panels, spans, table
-from mbma_tables import Bodies, Surface, contact, materials
+from generate.page import Cell, Measured, Picture, panels, spans, table
+from mbma_tables import (
+    Bodies,
+    Surface,
+    contact,
+    contact_law,
+    materials,
+    sealing_pressure,
+)
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import OutOfRangeError
 from mbma_tables.common.files import shipped_file
+from mbma_tables.common.plots import number_ticks
 from mbma_tables.contacts.quantities.effective_medium import FlowConstants
 from mbma_tables.contacts.quantities.leakage import GROUP, shipped_flow
 from mbma_tables.theories.calibrated.formulas import CONSTANTS
@@ -89,6 +97,17 @@ HELD_OUT = {
     "three_waves": "of both, three longest wavelengths a side or more",
     "stretched": "stretched",
 }
+# the seal of docs/leakage.md, its gas and the leak rate that is asked for
+SEAL = Surface(hurst=0.8, q0=0.01, q1=0.4, h_rms=2.0, h_max=7.0, unit="um")
+SEAL_PRESSURES = np.geomspace(0.02, 0.5, 60)  # MPa
+RING: dict[str, Any] = {
+    "inlet": "1 bar",
+    "outlet": "0 bar",
+    "width": "2 mm",
+    "length": "0.3 m",
+}
+LEAK_UNIT = "mbar l/s"
+WANTED_LEAK = 1e-2
 RATIOS = ("elastic area over true", "elastic force over true")
 
 
@@ -217,7 +236,11 @@ def leakage() -> Measured:
             unloaded_flow.errors(pd.read_csv(unloaded_flow.FILE))
         ),
     }
-    return parts, {"docs/figures/leakage.svg": draw_leakage(seen)}
+    pictures: dict[str, Picture] = {
+        "docs/figures/leakage.svg": draw_leakage(seen),
+        "docs/figures/helium.svg": draw_gas_leak(),
+    }
+    return parts, pictures
 
 
 def leakage_accuracy() -> str:
@@ -318,6 +341,37 @@ def draw_leakage(seen: Sequence[Case]) -> Figure:
         axes.grid(alpha=0.3)
     panels_of_hurst[0].set_ylabel("flow coefficient over h_rms^3,  k")
     panels_of_hurst[0].legend(fontsize="small")
+    return figure
+
+
+def draw_gas_leak() -> Figure:
+    """Leak of two gases against the pressure of the seal of docs/leakage.md."""
+    found = contact(SEAL, "20 MPa", pressure=SEAL_PRESSURES, theory="calibrated")
+    leak = found.leakage
+    factor = np.exp(leak.scatter)
+    figure, axes = panels(size=(6.0, 4.0))
+    for number, gas in enumerate(("helium", "air")):
+        # where it is blocked there is no rate, and no logarithm of it
+        rate = np.where(leak.blocked, np.nan, leak.gas(gas, **RING, unit=LEAK_UNIT))
+        colour = f"C{number}"
+        axes.plot(SEAL_PRESSURES, rate, ":", color=colour)
+        of_valid = np.where(leak.valid, rate, np.nan)
+        axes.plot(SEAL_PRESSURES, of_valid, color=colour, label=gas)
+        axes.fill_between(
+            SEAL_PRESSURES, of_valid / factor, of_valid * factor, color=colour, alpha=0.2
+        )
+    law = contact_law(SEAL, "20 MPa", theory="calibrated")
+    wanted = sealing_pressure(law, f"{WANTED_LEAK:g} {LEAK_UNIT}", gas="helium", **RING)
+    spread = [[wanted.pressure - wanted.low], [wanted.high - wanted.pressure]]
+    axes.errorbar(
+        [wanted.pressure], [WANTED_LEAK], xerr=spread, fmt="ko", capsize=3,
+        label=f"sealing_pressure, {WANTED_LEAK:g} {LEAK_UNIT}",
+    )  # fmt: skip
+    axes.set(xscale="log", yscale="log", ylim=(1e-6, 3))
+    axes.set(xlabel="pressure F/A0 [MPa]", ylabel=f"leak rate [{LEAK_UNIT}]")
+    number_ticks(axes)
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize="small", loc="lower left")
     return figure
 
 

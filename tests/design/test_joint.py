@@ -337,10 +337,15 @@ def test_functions_of_yielded_joints(joint, tmp_path):
 
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="not installed: ccx")
 def test_two_heated_and_sheared_blocks_in_calculix():
-    for name, simulated, law in runpy.run_path(str(EXAMPLE.with_name("two_blocks.py")))[
-        "compared"
-    ]():
+    example = runpy.run_path(str(EXAMPLE.with_name("two_blocks.py")))
+    rows = example["compared"]()
+    for name, simulated, law in rows:
         assert simulated == pytest.approx(law, rel=0.01), name
+    by_law, dots, perfect = example["draw"](rows).axes[0].lines
+    np.testing.assert_allclose(dots.get_ydata(), by_law.get_ydata(), atol=0.5)
+    # the same heat flows through both blocks, whose faces are as warm as each other
+    slopes = np.diff(perfect.get_ydata()) / np.diff(perfect.get_xdata())
+    assert slopes[0] * 42.7 == pytest.approx(slopes[1] * 167.0)
 
 
 def test_parts_with_a_lay_have_a_direction():
