@@ -206,7 +206,7 @@ LONG = {
         "from mbma_tables.theories import Mbma\nexact = Mbma(island_model='exact')",
         "contact(one, separation=np.linspace(0, 2, 2000), theory=exact)",
     ),
-    "islands": ("X = np.linspace(-5, 40, 1_000_000)", "greenwood_tripp.solve(X, 1.0)"),
+    "islands": ("X = np.linspace(-5, 40, 100_000)", "greenwood_tripp.solve(X, 1.0)"),
     "four numbers": (
         "four, delta = open_table('island4d'), np.linspace(1, 2, 3_000_000)",
         "four.lookup(delta, 3.0, 20.0, 0.8)",
