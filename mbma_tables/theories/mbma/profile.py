@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+import weakref
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -57,13 +58,21 @@ Fields = Callable[[FloatArray, NDArray[np.bool_]], tuple[FloatArray, float]]
 Nodes = tuple[FloatArray, FloatArray, FloatArray, NDArray[np.int64]]
 
 
+# those of batches, which may be more than `_of_bands` keeps
+_spectra: weakref.WeakKeyDictionary[AnySurface, list[MeasuredSurface]] = (
+    weakref.WeakKeyDictionary()
+)
+
+
 def spectra_of(surface: AnySurface) -> list[MeasuredSurface]:
     """One surface given by its spectrum, or those of a batch of sums of power laws, in their order."""
     if isinstance(surface, MeasuredSurface):
         return [surface]
-    numbers = np.broadcast_arrays(*surface.numbers().values())
-    rows = np.reshape(numbers, (len(numbers), -1)).T.tolist()
-    return [_of_bands(tuple(row)) for row in rows]
+    if surface not in _spectra:
+        numbers = np.broadcast_arrays(*surface.numbers().values())
+        rows = np.reshape(numbers, (len(numbers), -1)).T.tolist()
+        _spectra[surface] = [_of_bands(tuple(row)) for row in rows]
+    return _spectra[surface]
 
 
 @shared(KEPT)
@@ -552,7 +561,7 @@ def _profile(
         by_table = True
         fields = _fields_by_table(surface, model, variant)
     else:
-        fields = _fields(source, model, "exact" if outside == "exact" else "nan", rows)
+        fields = _fields(source, model, outside, rows)
     edges = _edges(source, min(2 * source.peak, last))
     # underflow to zero is correct here
     with np.errstate(under="ignore"):
@@ -586,4 +595,6 @@ def profile(
     """
     is_of_library = type(model).__module__.startswith("mbma_tables.")
     make: Callable[..., Profile] = _profile if is_of_library else _profile.__wrapped__
-    return make(surface, model, variant, rtol, outside, rows, last)
+    # one profile for all who end at the table, whether they refuse what is beyond or not
+    beyond = "exact" if outside == "exact" else "nan"
+    return make(surface, model, variant, rtol, beyond, rows, last)

@@ -13,7 +13,7 @@ from mbma_tables.islands.island_models import answer_islands
 from mbma_tables.islands.variants import FITTED, PRINTED, REPORTED
 from mbma_tables.theories import Mbma
 from mbma_tables.theories.mbma.models import get_model
-from mbma_tables.theories.mbma.profile import profile, source_of
+from mbma_tables.theories.mbma.profile import _of_bands, profile, source_of, spectra_of
 
 DATA = pathlib.Path(__file__).parents[2] / "data"
 DEPTHS = np.array([1e-9, 1e-4, 0.02, 0.3, 1.0, 1.5, 2.0])  # (h_max - d)/h_max
@@ -73,6 +73,26 @@ def test_errors_hold_and_slopes_are_slopes(seed, share):
     step = 1e-4 * c
     slopes = (fine.totals(c + step) - fine.totals(c - step)) / (2 * step)
     assert two[2:] == pytest.approx(slopes, rel=2e-5)
+
+
+def test_a_spectrum_has_one_profile_whether_islands_beyond_the_table_are_refused_or_not():
+    surface = rough()
+    model = get_model("universal", 1e-8, REPORTED)
+    made = profile(surface, model, REPORTED, 1e-3, "raise")
+    assert profile(surface, model, REPORTED, 1e-3, "nan") is made
+    assert profile(surface, model, REPORTED, 1e-3, "exact") is not made
+
+
+def test_spectra_of_a_batch_are_made_once():
+    one, other = five_numbers(), five_numbers(hurst=0.7, h_max=[2.0, 3.0])
+    batch = one.combined(other, 1e8)
+    made = spectra_of(batch)
+    # as where a batch has more than are kept by their numbers
+    _of_bands.cache_clear()
+    assert [each is same for each, same in zip(made, spectra_of(batch), strict=True)] == [
+        True,
+        True,
+    ]
 
 
 def test_slopes_hold_in_thin_panels():
