@@ -76,6 +76,7 @@ SIMPLER_WEIGHTS = difference_weights(BOTH_SIDES[3:5])
 LIMIT_WEIGHTS = np.array([3.0, -3.0, 1.0])  # of a parabola at 0, by its values at 1, 2, 3
 # offsets of polynomials through values that are not smooth to rounding
 WIDE = 100.0
+FAR = 30.0  # likewise, over which one side of a kink is compared
 MANY = (-6.0, -5.0, -4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 INNER = slice(3, 9)
 POWERS = np.vander(MANY, 5, increasing=True)
@@ -562,11 +563,40 @@ class _Differences:
         ):
             values[place, :, entry] = np.where(keep, own, values[place, :, entry].T).T
         table.sides[place, entry] = np.where(kinked, side, 0)
+        if kinked.any():
+            some = place[kinked], entry[kinked]
+            far = np.abs(step[kinked]) * (FAR / FINER**LEVELS) * side[kinked]
+            self._compare_with_far(table, part, some, far, keep[:, kinked])
         wide = uneven.any(axis=0)
         if wide.any():
             some = place[wide], entry[wide]
             over = step[wide] * (WIDE / FINER**LEVELS)
             self._over_more(table, part, some, over, uneven[:, wide])
+
+    def _compare_with_far(
+        self,
+        table: _SlopeTable,
+        part: Mapping[str, FloatArray],
+        pairs: tuple[NDArray[np.intp], ...],
+        step: FloatArray,
+        chosen: NDArray[np.bool_],
+    ) -> None:
+        """Raise the errors of one side's derivatives to the difference from those over far longer steps.
+
+        A sum over bands of wavelengths may bend over the width of one band as the theory
+        does not: its derivative is that of this sum alone.
+        """
+        try:
+            found, _ = self._at_pairs(part, pairs, step, ONE_SIDE)
+        except (InputError, ConvergenceError):
+            # nothing is defined so far on this side
+            return
+        place, entry = pairs
+        slope = np.tensordot(SIDE_WEIGHTS, found, 1) / step
+        apart = np.nan_to_num(np.abs(slope - table.slopes[place, :, entry].T))
+        errors = table.errors[place, :, entry].T
+        larger = np.where(chosen, np.maximum(errors, apart), errors)
+        table.errors[place, :, entry] = larger.T
 
     def _over_more(
         self,

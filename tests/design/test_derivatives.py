@@ -320,3 +320,10 @@ def test_kinks_of_faces_alike_are_of_a_named_side():
     assert slopes[-1] > 0 > slopes[1]
     slope = float(found.slopes["part_b.longest"]["hydraulic_aperture"][0])
     assert slope == pytest.approx(slopes[side], rel=1e-2)
+
+    # over 1% neither side has this kink, which is one of the sum over bands of wavelengths
+    ends = joint(700.0 * np.exp([0.0, side * 0.01])).at_pressure("10 MPa")
+    here, there = np.log(ends.hydraulic_aperture)
+    over_bands = side * (there - here) / 0.01
+    error = float(found.errors["part_b.longest"]["hydraulic_aperture"][0])
+    assert error >= abs(slope - over_bands) / 3 >= 1e-3
