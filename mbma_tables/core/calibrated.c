@@ -99,18 +99,46 @@ MBMA_INLINE size_t held_owner(const mbma_surfaces *surfaces, int64_t owner) {
     return (uint64_t)owner < surfaces->count ? (size_t)owner : 0;
 }
 
-size_t mbma_spline_values(const mbma_spline *s, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,
-                          const double *x, double *restrict value, double *restrict slope) {
+/* ---- flow through the gaps --------------------------------------------------------------------------------------- */
+
+#define LEAST_AREA 1e-300 /* smaller contact fractions count as zero */
+
+/* Below the table ln R is in proportion to A^obstruction, above it R is a power of threshold - A/A0. */
+MBMA_INLINE double flow_at(const mbma_flow_table *t, const own_spline *own, double u, double area) {
+    const mbma_spline *const s = &t->log_factor;
+    const double first = s->first[2], last = first + (double)s->cells[2] / s->rate[2];
+    const double odds = mbma_log(mbma_max(area, LEAST_AREA) / mbma_max(t->threshold - area, LEAST_AREA));
+    double slope, value = value_at(s, own, odds, &slope);
+    value = mbma_fma(slope, mbma_max(odds - last, 0.0), value);
+    value *= mbma_exp(t->obstruction * mbma_min(odds - first, 0.0));
+    return area < t->threshold ? u * u * u * mbma_wide_gap(u) * mbma_exp(mbma_min(value, 0.0)) : 0.0;
+}
+
+size_t mbma_contact_flows(const mbma_flow_table *t, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,
+                          const double *u, const double *area, double *restrict flow) {
+    const mbma_spline *const s = &t->log_factor;
     size_t bad = 0;
     for (size_t k = 0; k < n; k++) {
         const size_t mine = held_owner(surfaces, owner[k]);
         const own_spline own = own_of(s, surfaces, mine);
-        const bool good = x[k] == x[k] && (uint64_t)owner[k] < surfaces->count &&
+        const bool good = u[k] == u[k] && area[k] == area[k] && (uint64_t)owner[k] < surfaces->count &&
                           (own.pieces || covers(s, surfaces->hurst[mine], surfaces->log_zeta_1[mine]));
-        value[k] = value_at(s, &own, x[k], &slope[k]);
-        if (!good)
-            value[k] = slope[k] = NAN;
+        const double found = flow_at(t, &own, u[k], area[k]);
+        flow[k] = good ? found : NAN;
         bad += !good;
+    }
+    return bad;
+}
+
+size_t mbma_flow_areas(size_t n, const double *area, const double *yielded, const mbma_flow_law *law,
+                       double *elastic) {
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        const double growth = pow(yielded[k], law->yielded_power);
+        const double threshold = law->threshold + law->yielded_threshold * growth;
+        const double bent = pow(area[k] / threshold, law->yielded_exponent * growth);
+        elastic[k] = area[k] * (law->threshold / threshold) * bent;
+        bad += elastic[k] != elastic[k];
     }
     return bad;
 }

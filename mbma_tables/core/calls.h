@@ -744,14 +744,27 @@ static bool do_calibrated_separation(const argument *a, long long *answer) {
     return true;
 }
 
-static bool do_spline_values(const argument *a, long long *answer) {
-    enum { OWNER = SURFACES_ARGUMENTS, X, VALUE, SLOPE };
+/* The constants of a table of flow stand in the place of those of the calibrated law. */
+static bool do_contact_flows(const argument *a, long long *answer) {
+    enum { OWNER = SURFACES_ARGUMENTS, GAP, AREA, FLOW };
     if (!fits_spline(a) || a[SURFACES_HURST].count == 0)
         return false;
-    const mbma_spline spline = spline_of(a);
+    const spline_numbers *const numbers = a[SPLINE_NUMBERS].items;
+    const mbma_flow_table table = {
+        .log_factor = spline_of(a),
+        .threshold = numbers->area_s0,
+        .obstruction = numbers->area_slope,
+    };
     const mbma_surfaces surfaces = surfaces_of(a);
-    *answer = (long long)mbma_spline_values(&spline, &surfaces, a[OWNER].count, a[OWNER].items,
-                                            a[X].items, a[VALUE].items, a[SLOPE].items);
+    *answer = (long long)mbma_contact_flows(&table, &surfaces, a[OWNER].count, a[OWNER].items,
+                                            a[GAP].items, a[AREA].items, a[FLOW].items);
+    return true;
+}
+
+static bool do_flow_areas(const argument *a, long long *answer) {
+    enum { AREA, YIELDED, LAW, ELASTIC };
+    *answer = (long long)mbma_flow_areas(a[AREA].count, a[AREA].items, a[YIELDED].items,
+                                         a[LAW].items, a[ELASTIC].items);
     return true;
 }
 
@@ -1079,7 +1092,8 @@ static bool do_yielding_planes(const argument *a, long long *answer) {
     FN(calibrated_ends, SPLINE "Dn D D w2n") \
     FN(calibrated_contact, SPLINE "Dn D2n D Lm Dm wm wm wm") \
     FN(calibrated_separation, SPLINE "Dn D2n D Lm Dm wm") \
-    FN(spline_values, SPLINE "D D D Lm Dm wm wm") \
+    FN(contact_flows, SPLINE "D D D Lm Dm Dm wm") \
+    FN(flow_areas, "Dn Dn D7 wn") \
     FN(self_affine, "Dn Dn wn wn") \
     FN(words_of_spectrum_law, "") \
     FN(spectrum_waves, "Dn Dn wm wm wm w4") \

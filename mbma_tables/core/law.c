@@ -322,5 +322,5 @@ double mbma_law_flow(const mbma_law *flow, double h_max, double h_rms, double d,
     const bool open = d > flow->head->highest && d < (double)INFINITY;
     if (by_c)
         *by_c = open ? -3.0 * u * u * (1.0 - 1.5 / w + v / (w * w)) : mbma_law_at(flow, MBMA_STIFFNESS, d);
-    return open ? u * u * u * (1.0 - 1.5 / w) : mbma_law_at(flow, MBMA_FORCE, d);
+    return open ? u * u * u * mbma_wide_gap(u / h_rms) : mbma_law_at(flow, MBMA_FORCE, d);
 }

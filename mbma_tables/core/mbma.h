@@ -381,9 +381,25 @@ size_t mbma_calibrated_areas(const mbma_calibrated_table *table, const mbma_surf
 size_t mbma_calibrated_separation(const mbma_calibrated_table *table, const mbma_surfaces *surfaces, size_t n,
                                   const int64_t *owner, const double *force, double *u);
 
-/* The spline and its slope at places of the third axis, held at its ends; `pieces` may be those of any spectrum. */
-size_t mbma_spline_values(const mbma_spline *spline, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,
-                          const double *x, double *value, double *slope);
+/* Flow through gaps: ln R of the spline over the odds ln A/(threshold A0 - A); A is obstructed as A^obstruction. */
+typedef struct {
+    mbma_spline log_factor;
+    double threshold, obstruction;
+} mbma_flow_table;
+
+/* Flow coefficients k = u^3 (1 - 1.5/(u^2 + 4)) R over h_rms^3, and 0 from A/A0 = threshold on, at mean gaps over h_rms and
+ * contact fractions; `pieces` of the surfaces may be those of any spectrum. */
+size_t mbma_contact_flows(const mbma_flow_table *table, const mbma_surfaces *surfaces, size_t n, const int64_t *owner,
+                          const double *u, const double *area, double *flow);
+
+/* Constants of flow, fitted to boundary elements; docs/leakage.md has the equations. */
+typedef struct {
+    double threshold, obstruction, prefactor, exponent, yielded_threshold, yielded_exponent, yielded_power;
+} mbma_flow_law;
+
+/* A/A0 of the elastic contacts that obstruct flow as contacts do of which a share is at its hardness. */
+size_t mbma_flow_areas(size_t n, const double *area, const double *yielded, const mbma_flow_law *law,
+                       double *elastic);
 
 /* ---- spectrum_laws.c: Persson's theory and the calibrated law of a spectrum --------------------------------------- */
 

@@ -182,6 +182,8 @@ def use():
             )
             contact(one, Bodies(hardness=cap), pressure=found.pressure, theory=theory)
     assert (found.plane_separation < found.mean_separation).any()
+    yielded = contact(one, Bodies(hardness=0.05), pressure=1e-3, theory="calibrated")
+    assert yielded.flow_coefficient > 0
     assert found.yielded.any()
     assert (found.unloading_stiffness > found.stiffness).any()
     bearing_share(np.linspace(0.0, 3.5, 30), 3.0)

@@ -31,7 +31,7 @@ INTEL = platform.machine() in ("x86_64", "AMD64")
 # what calls no function of the C library: the same bits wherever a processor has an fma
 EXACT = {
     *("calibrated_contact", "calibrated_ends", "calibrated_separation", "elementary"),
-    *("spline_values", "height_integrals", "island_extents", "islands_work"),
+    *("contact_flows", "height_integrals", "island_extents", "islands_work"),
     *("phi", "profile_missed", "self_affine", "solve_islands", "spline_pieces"),
 }
 

@@ -122,7 +122,7 @@ fn main() {
             "calibrated" => mbma::calibrated_of(&surface(), v[5], v[6]).map(of),
             "joint" => mbma::joint_of(&surface(), &bodies(), v[9]).map(|j| vec![
                 j.force, j.area, j.stiffness, j.error, j.yielded, j.unloading_stiffness, j.tangential_stiffness,
-                j.solid_conductance, j.plane_separation]),
+                j.solid_conductance, j.plane_separation, j.flow_coefficient]),
             "joint_separation" => mbma::joint_separation_of(&surface(), &bodies(), v[9]).map(|d| vec![d]),
             _ => mbma::calibrated_separation_of(&surface(), v[5], v[6]).map(|d| vec![d]),
         }.unwrap();

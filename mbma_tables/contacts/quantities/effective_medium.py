@@ -11,8 +11,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.arguments import FloatArray, answered
 from mbma_tables.common.shared import shared, shared_property
+from mbma_tables.core import core
 from mbma_tables.theories.calibrated.formulas import (
     CONSTANTS,
     CalibratedConstants,
@@ -58,11 +59,8 @@ class FlowConstants:
 
     def elastic_area(self, area: ArrayLike, yielded: ArrayLike) -> FloatArray:
         """A/A0 of the elastic contact that obstructs flow as one does of which a share is at its hardness."""
-        share = np.asarray(area, float)
-        growth = np.asarray(yielded, float) ** self.yielded_power
-        threshold = self.threshold + self.yielded_threshold * growth
-        bent = (share / threshold) ** (self.yielded_exponent * growth)
-        return np.asarray(share * (self.threshold / threshold) * bent)
+        numbers = np.array(dataclasses.astuple(self))
+        return answered(core.flow_areas, (area, yielded), 1, numbers)[0]
 
     def closed_form(self, u: ArrayLike, area: ArrayLike) -> FloatArray:
         """k at mean gaps u [h_rms] and A/A0 without a spectrum, for zeta_1 up to 32; 0 at and above the threshold."""

@@ -23,7 +23,6 @@ from mbma_tables.common.arguments import (
 )
 from mbma_tables.common.display import Displayed, Variable, shown
 from mbma_tables.common.errors import InputError
-from mbma_tables.common.interrupts import in_blocks
 from mbma_tables.common.plots import draw_compression, leakage_label, pressure_label
 from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.common.units import Dimension, Units, factor
@@ -70,7 +69,6 @@ AXES = ("hurst", "log_zeta_1", "log_odds")
 COVERED = np.array(
     [[0.1, 1.0], [math.log(3.0), math.log(1e5)]]
 )  # H and ln zeta_1, where the error was measured
-FEW = 8192  # entries per block, so that a block fits into the processor's cache
 LEAST = 1e-300  # smaller contact fractions count as zero
 OWN_NODES = 64  # contact fractions at which a spectrum's own factor is found
 FLOW_NODES = 32  # of gaps between two magnifications, in batches
@@ -583,41 +581,18 @@ def shipped_flow() -> FlowTable:
     )
 
 
-@np.errstate(all="ignore")
 def _flow(
     given: tuple[Any, ...], owner: Owners, u: FloatArray, area: FloatArray
 ) -> FloatArray:
     """u^3 (1 - 1.5/(u^2 + 4)) R, and 0 from A/A0 = threshold on; ln R over ln A/(threshold A0 - A)."""
-    # below the table ln R is in proportion to A^obstruction, above it R is a power of
-    # threshold - A/A0
-    numbers = given[1]
-    found = np.empty(u.shape)
-    threshold = numbers[10]
-    obstruction = numbers[11]
-    first = numbers[2]
-    last = first + given[2][2] / numbers[5]
-
-    def fill(k: slice) -> None:
-        # contact fractions of Greenwood and Williamson exceed 1
-        a = area[k]
-        odds = np.log(np.maximum(a, LEAST) / np.maximum(threshold - a, LEAST))
-        value, slope = np.empty((2, odds.size))
-        core.spline_values(*given, owner[k], odds, value, slope)
-        unknown = np.isnan(u[k]) | np.isnan(value)
-        value += slope * np.maximum(odds - last, 0.0)
-        log_factor = np.minimum(
-            value * np.exp(obstruction * np.minimum(odds - first, 0.0)), 0.0
-        )
-        wide = u[k] * u[k] * u[k] * wide_gap(u[k]) * np.exp(log_factor)
-        found[k] = np.where(unknown, np.nan, np.where(a < threshold, wide, 0.0))
-
-    in_blocks(fill, u.size, FEW)
+    fill = functools.partial(core.contact_flows, *given)
+    found: FloatArray = filled(fill, (owner, u, area), 1)[0]
     return found
 
 
 @shared(KEPT)
 def own_factor(spectrum: Spectrum) -> tuple[Any, ...]:
-    """ln R over the table's odds of one spectrum, as `core.flow` takes it."""
+    """ln R over the table's odds of one spectrum, as `core.contact_flows` takes it."""
     from scipy.interpolate import PchipInterpolator
 
     table = shipped_flow()

@@ -24,6 +24,7 @@ from mbma_tables.bodies.materials import ISOTROPIC_SHARE
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
+from mbma_tables.contacts.quantities.leakage import shipped_flow
 from mbma_tables.export.model.bindings import binding_texts
 from mbma_tables.export.model.conformance import (
     FORM,
@@ -52,6 +53,7 @@ from mbma_tables.tables.universal import RECORD, UniversalModel
 from mbma_tables.theories import persson
 from mbma_tables.theories.calibrated import table as calibrated_table
 from mbma_tables.theories.calibrated.formulas import LAW_ERROR, YANG_PERSSON
+from mbma_tables.theories.evidence import SurfaceSpline
 from mbma_tables.theories.mbma.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.theories.mbma.closed_forms import FUNCTIONS
 from mbma_tables.theories.mbma.models import get_model
@@ -72,6 +74,7 @@ TYPES = {
     "MBMA_COEFFICIENTS": "float",
     "MBMA_ERRORS": "float",
     "MBMA_SPLINE": "float",
+    "MBMA_FLOW": "float",
 }
 MODEL = ("mbma_model.h", "mbma_model.c", "mbma_data.c")
 SELFTEST = "mbma_selftest.c"
@@ -259,7 +262,12 @@ def data_text(model: IslandTable, variant: Variant, later: bool = False) -> str:
     """The tables, and the variant of the equations; with `later` as variables, for a program to fill in."""
     lines = ['#include "mbma_model.h"']
     law = calibrated_table.shipped()
-    for name, values in tables(model).items():
+    flow = shipped_flow()
+    arrays = tables(model)
+    # in the page, which has no flow, it would be the larger part of what is added
+    if not later:
+        arrays["MBMA_FLOW"] = flow.core_table[0]
+    for name, values in arrays.items():
         kind = TYPES[name]
         head = f"{kind} {name}[{len(values)}]"
         body = (
@@ -270,27 +278,31 @@ def data_text(model: IslandTable, variant: Variant, later: bool = False) -> str:
             if later
             else ["", f"static const {head} = {{", *body(values), "};"]
         )
-    spline = (
-        "MBMA_SPLINE",
-        law.cells,
-        law.first,
-        1 / law.step,
-        law.covered[:2, 0],
-        law.covered[:2, 1],
-    )
     theories = [
         np.array(dataclasses.astuple(constants))
         for constants in (YANG_PERSSON, law.constants)
     ]
     values = {
         f"{table_type(model)} CELLS": island_table(model),
-        "mbma_calibrated_table LAW": braces(braces(*spline), *numerals(theories[1][:3])),
+        "mbma_calibrated_table LAW": braces(
+            _spline("MBMA_SPLINE", law), *numerals(theories[1][:3])
+        ),
         "mbma_law_constants THEORIES[]": braces(*theories),
         "mbma_hardness_law HARDNESS": braces(
             *numerals(np.array(dataclasses.astuple(yielding.CONSTANTS)))
         ),
         "mbma_variant MBMA_VARIANT": _variant(variant.numbers),
     }
+    lines_of_flow = []
+    if not later:
+        numbers = numerals(np.array(flow.law_constants[:2]))
+        constants = numerals(np.array(dataclasses.astuple(flow.constants)))
+        values["mbma_flow_table FLOWS"] = braces(_spline("MBMA_FLOW", flow), *numbers)
+        values["mbma_flow_law FLOW"] = braces(*constants)
+        lines_of_flow = [
+            "const mbma_flow_table *mbma_flows(void) { return &FLOWS; }",
+            "const mbma_flow_law *mbma_flow(void) { return &FLOW; }",
+        ]
     held = (
         f"{'' if later and 'MBMA' in name else 'static const '}{name} = {text};"
         for name, text in values.items()
@@ -304,8 +316,15 @@ def data_text(model: IslandTable, variant: Variant, later: bool = False) -> str:
         "const mbma_variant *mbma_model_variant(void) { return &MBMA_VARIANT; }",
         "const mbma_law_constants *mbma_theory(int theory) { return &THEORIES[theory == MBMA_CALIBRATED]; }",
         "const mbma_hardness_law *mbma_hardness(void) { return &HARDNESS; }",
+        *lines_of_flow,
     ]
     return "\n".join([*lines, ""])
+
+
+def _spline(name: str, table: SurfaceSpline) -> str:
+    """The initialiser of a spline whose coefficients have a name."""
+    low, high = table.covered[:2].T
+    return braces(name, table.cells, table.first, 1 / table.step, low, high)
 
 
 def _wrapped(items: Sequence[str], first: str = "", last: str = "") -> list[str]:

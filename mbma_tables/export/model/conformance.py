@@ -40,6 +40,7 @@ JOINT = (
     "tangential_stiffness",
     "solid_conductance",
     "plane_separation",
+    "flow_coefficient",
 )
 KINDS = {
     "geometry": f"approach, hurst, zeta_1; {', '.join(FIELDS)}",
