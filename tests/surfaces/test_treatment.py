@@ -501,3 +501,36 @@ def test_lengths_with_their_unit():
     assert named.unit == "um"
     with pytest.raises(InputError, match="whose unit of length is not known"):
         Surface.from_map(MAP, STEP, short_cutoff="3 um")
+
+
+def test_a_file_of_a_sensofar_microscope(tmp_path):
+    """As their .plux files are built: lengths and layers in XML, heights [um] along y first."""
+    import zipfile
+
+    heights = MAP[:40, :36].astype("<f4")
+    heights[3, 7] = np.nan
+    general = {
+        "DATE": "Thu Nov 26 10:00:00 2020",
+        "IMAGE_SIZE_X": 40,
+        "IMAGE_SIZE_Y": 36,
+        "FOV_X": 0.5,
+        "FOV_Y": 0.25,
+    }
+    entries = "".join(f"<{name}>{value}</{name}>" for name, value in general.items())
+    index = (
+        f"<xml><GENERAL>{entries}</GENERAL>"
+        "<INFO><ITEM_0><NAME>Device</NAME><VALUE>S neox</VALUE></ITEM_0></INFO>"
+        "<LAYER_0><FILENAME_Z>LAYER_0.raw</FILENAME_Z></LAYER_0></xml>"
+    )
+    path = tmp_path / "a.plux"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("index.xml", index)
+        archive.writestr("LAYER_0.raw", heights.T.tobytes())
+    surface = Surface.from_map(path, detrend="mean")
+    assert surface.unit == "um"
+    assert surface.map.steps == pytest.approx((0.5, 0.25))
+    known = np.isfinite(heights)
+    found = surface.map.heights
+    shift = np.mean(found[known] - heights[known])
+    np.testing.assert_allclose(found[known], heights[known] + shift, atol=1e-6)
+    assert "1 of 1440 points" in told(surface, "fill")
