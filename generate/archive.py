@@ -19,7 +19,7 @@ FILES = {
         "boundary_elements",
     ),
     "bandwidth.nc": (
-        "wavelengths of 1:256 and 1:512",
+        "wavelengths of 1:256 to 1:1024, some with a hardness",
         "boundary_elements --of bandwidth",
     ),
     "boundary_element_grids.csv": (

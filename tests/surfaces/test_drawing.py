@@ -164,8 +164,25 @@ def test_a_band_is_no_narrower_without_a_number(part, number):
     ]
     known = [band(**{number: value}) for value in values]
     assert (np.mean([each for each, _ in known], axis=0) < without).all()
-    # valid without the number is valid with it, whatever it is
-    assert not valid or all(with_it for _, with_it in known)
+    assert not valid
+    assert not any(with_it for _, with_it in known) or part["process"] == "gaussian"
+
+
+@pytest.mark.parametrize("theory", ["calibrated", "persson"])
+def test_what_is_valid_without_a_number_is_valid_with_it(theory):
+    face = {"Ra": "1.6 um", "process": "gaussian", "longest": "250 um"}
+    elastic = Bodies("58 GPa", hardness=np.inf)
+
+    def valid(**more):
+        part = face | more
+        joint = Joint(part, bodies=elastic, theory=theory, nominal_area="4 cm^2")
+        found = joint.uncertainty("20 MPa", draws=100, quantities=["area"])
+        return bool(found.valid.all())
+
+    own = distribution_of("shortest", drawing_of(face)[0]["shortest"])
+    ends = [own.written(float(own.quantile(level))) for level in (0, 0.3, 1)]
+    assert valid()
+    assert all(valid(shortest=value) for value in ends)
 
 
 def test_more_numbers_never_turn_an_answer_into_a_refusal():
