@@ -21,6 +21,7 @@ from mbma_tables import (
     Scene,
     Surface,
     contact,
+    contact_function,
     contact_law,
     sensitivity,
 )
@@ -442,3 +443,44 @@ def test_derivatives_by_work_and_range_are_slopes_of_contacts():
         ]
         slope = (np.log(ends[0]) - np.log(ends[1])) / np.log((1 + step) / (1 - step))
         assert by.slopes[name]["area"] == pytest.approx(slope, rel=1e-4)
+
+
+def test_derivatives_of_everything_that_attracts_are_differences():
+    """By bodies, surface and load, of functions, joints, arrays and batches, against contacts on both sides."""
+    names = ("area", "unloading_stiffness", "attraction", "zero_load_area", "tabor_number", "pull_off")  # fmt: skip
+    numbers = {"work": 1e-5, "range": 0.01, "h_rms": 0.1, "E_star": 1.0, "pressure": 1e-3}
+
+    def values(work, range, h_rms, E_star, pressure):
+        face = dataclasses.replace(FACE, h_rms=h_rms)
+        bodies = Bodies(f"{float(E_star)!r} GPa", adhesion=Adhesion(work, range))
+        found = contact(face, bodies, pressure=pressure, theory="calibrated")
+        return np.array([float(found.quantity(name)) for name in names])
+
+    function = contact_function(FACE, adhesive(1e-5, 0.01), quantities=names, numbers=list(numbers), pressure=1e-3, theory="calibrated")  # fmt: skip
+    at = np.array(list(numbers.values()))
+    found, jacobian = function.values_and_jacobian(at)
+    np.testing.assert_allclose(found, values(*at), rtol=1e-9)
+    step = 1e-3
+    for column, number in enumerate(at):
+        ends = np.array([at, at])
+        ends[:, column] = number * (1 + step), number * (1 - step)
+        slope = (values(*ends[0]) - values(*ends[1])) / (2 * step * number)
+        largest = 1e-6 * np.abs(found / number)
+        np.testing.assert_allclose(jacobian[:, column], slope, rtol=2e-3, atol=largest.max() * 1e-3)  # fmt: skip
+    joint = Joint(FACE, bodies=adhesive(1e-5, 0.01), theory="calibrated")
+    of_joint = joint.function(["area"], ["work", "range"], 1e-3)
+    np.testing.assert_allclose(of_joint.jacobian(of_joint.start), jacobian[:1, :2], rtol=1e-5)  # fmt: skip
+    asked = {"pressure": 1e-3, "theory": "calibrated"}
+    works = sensitivity(FACE, adhesive([1e-5, 4e-6], 0.01), **asked)
+    own = [sensitivity(FACE, adhesive(work, 0.01), **asked) for work in (1e-5, 4e-6)]
+    for name in ("work", "range", "h_rms"):
+        each = [one.derivatives[name]["area"] for one in own]
+        np.testing.assert_allclose(works.derivatives[name]["area"], each, rtol=1e-4)
+    faces = Surface(hurst=[0.8, 0.7], q0=0.1, q1=1.6, h_rms=0.1, h_max=0.35, unit="um")
+    batch = sensitivity(faces, adhesive(1e-5, 0.01), **asked)
+    assert batch.slopes["work"]["area"][0] == pytest.approx(own[0].slopes["work"]["area"], rel=1e-4)  # fmt: skip
+    # beyond pull-off there is no contact to derive
+    with pytest.raises(OutOfRangeError, match="part"):
+        sensitivity(FACE, STICKY, pressure=-1.0, theory="calibrated")
+    with pytest.raises(InputError, match="work must be an energy"):
+        Joint(FACE, bodies=Bodies("1 GPa", adhesion=Adhesion("8..12 mJ/m^2", RANGE)))
