@@ -41,6 +41,7 @@ RANGES = (0.03, 0.1, 0.3, 1.0)  # over h_rms
 TABOR = (0.1, 0.2, 0.35, 0.5)
 AREAS = (0.002, 0.006, 0.02, 0.06, 0.15, 0.3, 0.55, 0.8)  # of elastic loads, about
 TOLERANCE = 1e-6
+PATH_RANGE = 0.3  # over h_rms, of contacts followed in approach
 COVERED = 0.92  # share of contacts that two standard deviations are to cover
 GRADIENT = 0.1  # rms, of surfaces that theories are asked about
 HEAD = """\
@@ -145,6 +146,58 @@ def _answers(
     return found
 
 
+def approached(case: Case, work: float) -> pd.DataFrame:
+    """Contacts of a case from the lightest load on, each from the one before it; work over E* in h_rms."""
+    surface = case.map()
+    h_rms = float(surface.std())
+    rho, strength = case.range * h_rms, work / case.range
+    engine = AdhesiveContact(
+        surface, (1.0, 1.0), lambda gap: strength * np.exp(-gap / rho), TOLERANCE
+    )
+    found = []
+    for share in AREAS:
+        row = {"contact_pressure": load_at(share, np.inf)}
+        try:
+            row |= engine.press(row["contact_pressure"])
+        except ConvergenceError:
+            break
+        row["mean_separation"] /= h_rms
+        found.append(row)
+    return pd.DataFrame(found)
+
+
+def _hysteresis(rows: pd.DataFrame) -> None:
+    """Contacts in approach beside those in retreat, of which the file is, on held-out surfaces."""
+    for number in TABOR:
+        differences = []
+        for case in cases():
+            if case.fitted or case.tabor != number or case.range != PATH_RANGE:
+                continue
+            own = (rows.seed == case.surface.seed) & (rows.range == case.range)
+            retreat = rows[own & (rows.tabor == number)].sort_values("contact_pressure")
+            approach = approached(case, float(retreat.work.iloc[0]))
+            retreat = retreat.iloc[: len(approach)]
+            net = approach.net_pressure.to_numpy() - retreat.net_pressure.to_numpy()
+            differences.append(
+                [
+                    np.abs(net) / approach.contact_pressure,
+                    np.abs(
+                        np.log(
+                            approach.mean_separation / retreat.mean_separation.to_numpy()
+                        )
+                    ),
+                    np.abs(approach.area_compressed - retreat.area_compressed.to_numpy()),
+                ]
+            )
+        found = np.concatenate([np.array(each) for each in differences], axis=1)
+        found = found[:, np.isfinite(found).all(axis=0)]
+        net, gap, area = found.max(axis=1) if found.size else (np.nan,) * 3
+        click.echo(
+            f"Tabor {number:g}: {found.shape[1]} contacts in approach and retreat; largest difference of "
+            f"net pressure over contact pressure {net:.1e}, of ln of the mean gap {gap:.1e}, of A/A0 {area:.1e}"
+        )
+
+
 def answered(rows: pd.DataFrame, name: str, share: float) -> pd.DataFrame:
     """What a theory answers at the net pressures of simulations, with a share of the traction in contact.
 
@@ -230,13 +283,23 @@ def _answer(row: Any, name: str) -> list[Any]:
 @click.option(
     "--scatter", is_flag=True, help="Print what covers held-out contacts, no runs."
 )
+@click.option(
+    "--hysteresis", is_flag=True, help="Follow held-out contacts in approach, in minutes."
+)
 def adhesion(
-    folder: pathlib.Path, data: pathlib.Path, compare: bool, scatter: bool
+    folder: pathlib.Path,
+    data: pathlib.Path,
+    compare: bool,
+    scatter: bool,
+    hysteresis: bool,
 ) -> None:
     """Solve contacts with an attraction, half an hour on one core; `--compare` with the theory.
 
     Stopped and called again, it goes on where it was.
     """
+    if hysteresis:
+        _hysteresis(pd.read_csv(data, comment="#"))
+        return
     if scatter:
         _fit_scatter(pd.read_csv(data, comment="#"))
         return

@@ -17,12 +17,16 @@ from generate.adhesion import (
     under_compression,
 )
 from generate.page import Measured, panels, percent, table
-from mbma_tables import Adhesion, Bodies, contact
+from mbma_tables import Adhesion, Bodies, Surface, contact
+from mbma_tables.contacts.sticking import Sticking, sticking
 from mbma_tables.theories import adhesion as theory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# two wafers
+WAFER = Surface(hurst=0.8, q0=0.01, q1=0.2, h_rms=0.2, h_max=0.7, unit="nm")
+WORKS = (100.0, 20.0, 5.0, 1.0)  # mJ/m^2
 SHOWN = (16, 17)  # seeds of held-out surfaces of the figure
 RANGE = 0.3  # over h_rms
 # what other commands measure
@@ -89,7 +93,78 @@ def adhesion() -> Measured:
         "errors": table(header, lines),
         "reached": _reached(ranges, coverage(rows)),
     }
-    return measured, {"docs/figures/adhesion.svg": _figure(rows)}
+    measured["criteria"] = _criteria()
+    figures = {
+        "docs/figures/adhesion.svg": _figure(rows),
+        "docs/figures/sticking.svg": _of_criteria(),
+    }
+    return measured, figures
+
+
+def _stuck(work: float) -> tuple[Sticking, float]:
+    """Two wafers with a work of adhesion [mJ/m^2], and their pull-off over the strength of the attraction."""
+    bodies = Bodies("80 GPa", adhesion=Adhesion(f"{work!r} mJ/m^2", "0.3 nm"))
+    found = sticking(WAFER, bodies, theory="calibrated")
+    strength = 1e-3 * work / 0.3e-9 / 1e9
+    return found, found.pull_off / strength
+
+
+def _criteria() -> str:
+    """Pull-off and contact at zero load of the wafers beside published criteria."""
+    lines = []
+    for work in WORKS:
+        found, share = _stuck(work)
+        verdicts = [
+            f"{one.number:.2g}{', sticks' if one.sticks else ''}"
+            for one in found.criteria
+        ]
+        lines.append(
+            [
+                f"{work:g} mJ/m^2",
+                f"{1e3 * found.pull_off:.3g} MPa",
+                f"{100 * share:.2g}%",
+                f"{100 * found.zero_load_area:.2g}%",
+                *verdicts,
+                "yes" if found.valid else "no: traction",
+            ]
+        )
+    names = [f"{one.name} (below {one.sticks_below:.3g})" for one in found.criteria]
+    header = [
+        "work",
+        "pull-off",
+        "over the strength",
+        "area at zero load",
+        *names,
+        "`valid`",
+    ]
+    return table(" | ".join(header), lines)
+
+
+def _of_criteria() -> Figure:
+    """Pull-off of the wafers over their work of adhesion, and from where on they stick by each criterion."""
+    figure, axes = panels(1, 1, (6.5, 3.6))
+    (axis,) = np.atleast_1d(axes)
+    work = np.geomspace(0.5, 200.0, 31)
+    answers = [_stuck(float(each)) for each in work]
+    share = np.array([part for _, part in answers])
+    valid = np.array([found.valid for found, _ in answers])
+    axis.semilogx(work, share, "--", label="pull-off, not valid")
+    axis.semilogx(
+        work[valid], share[valid], "-", lw=2.5, label="pull-off, zero load valid"
+    )
+    for k, one in enumerate(answers[0][0].criteria):
+        over = [
+            np.log(found.criteria[k].number / one.sticks_below) for found, _ in answers
+        ]
+        begin = np.exp(np.interp(0.0, -np.array(over), np.log(work)))
+        axis.axvline(
+            begin, color=f"C{k + 2}", ls=":", label=f"sticks from here: {one.name}"
+        )
+    axis.set_xlabel("work of adhesion [mJ/m^2]")
+    axis.set_ylabel("pull-off over strength")
+    axis.set_ylim(0, 0.6)
+    axis.legend(frameon=False, fontsize=8)
+    return figure
 
 
 def _nine_in_ten(lines: list[list[str]], column: int) -> str:

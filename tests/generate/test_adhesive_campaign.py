@@ -54,3 +54,13 @@ def test_work_and_range_have_the_tabor_number_that_is_asked():
     laplacian = np.fft.ifft2(-square * np.fft.fft2(surface)).real.std()
     assert rho == pytest.approx(0.3 * surface.std())
     assert np.cbrt(2 * work**2 / (laplacian * rho**3)) == pytest.approx(0.2, rel=0.02)
+
+
+def test_contacts_in_approach_are_those_in_retreat():
+    """Each from the one before it, on a path from the lightest load or from the heaviest."""
+    retreat = pd.DataFrame(adhesion.solved(SMALL)).iloc[::-1].reset_index()
+    approach = adhesion.approached(SMALL, float(retreat.work[0]))
+    assert len(approach) > 4
+    for name, atol in (("net_pressure", 1e-6), ("mean_separation", 1e-4), ("area", 1e-3)):
+        both = retreat[name][: len(approach)]
+        np.testing.assert_allclose(approach[name], both, rtol=1e-4, atol=atol)
