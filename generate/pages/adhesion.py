@@ -94,7 +94,7 @@ def adhesion() -> Measured:
         "reached": _reached(ranges, coverage(rows)),
     }
     measured["criteria"] = _criteria()
-    figures = {
+    figures: dict[str, bytes | Figure] = {
         "docs/figures/adhesion.svg": _figure(rows),
         "docs/figures/sticking.svg": _of_criteria(),
     }

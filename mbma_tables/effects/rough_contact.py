@@ -266,9 +266,8 @@ def rough_contact(
     if attraction is not None:
         if plane:
             raise InputError(
-                "cylinders that attract each other are not answered: their approach depends on "
-                "the place where it is measured, by far more than attraction deforms them; "
-                "shape='sphere' is covered"
+                "cylinders that attract each other are not answered: their contacts in retreat "
+                "are not found at all sizes; shape='sphere' is covered"
             )
         net = Adhesive(layer_theory, attraction, law.E_star)
         body = resolved(AttractingBody(**vars(body), net=net))
