@@ -32,6 +32,7 @@ from generate.files import ROOT
 from generate.pages.export import MEASURED, formats
 from mbma_tables import Bodies, ContactLaw, Joint, Surface, contact, contact_law
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.errors import ConvergenceError
 from mbma_tables.common.files import write_file
 from mbma_tables.contacts.quantities.registry import in_files
 from mbma_tables.effects.film import flow_factors
@@ -622,10 +623,15 @@ def measured(
     """Measure laws and add to the results by target, which `write` is given after every tenth law.
 
     Every law is written as rows of one quantity for all programs that take it, and as code
-    of one target, both in turns.
+    of one target, both in turns. Laws that do not converge are refused by every target.
     """
     for number in numbers:
-        for name, found in of_one_law(number):
+        try:
+            of_targets = [*of_one_law(number)]
+        except ConvergenceError as fault:
+            click.echo(f"law {number} is refused: {fault}")
+            continue
+        for name, found in of_targets:
             if found.share > 1:
                 click.echo(f"{name}, law {number}: {found}")
             so_far = results.setdefault(name, Measured())

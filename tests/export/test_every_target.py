@@ -44,6 +44,17 @@ def test_numbers_of_rows_are_those_of_the_library(name, rows):
         assert 0 < one.share <= 1
 
 
+@pytest.mark.parametrize(
+    ("number", "kind", "quantity"),
+    [(410, "map", "tangential_stiffness"), (589, "mbma", "hydraulic_aperture")],
+)
+def test_errors_of_jumps_and_of_slopes_are_stated(number, kind, quantity):
+    """Of the thousand: a jump between two points of the fine curve, a slope of the law's polynomials."""
+    one = programs.case(number, kind)
+    found = programs.in_rows(one, OF_ROWS["csv"], programs.rows(one, quantity))
+    assert found.share <= 1
+
+
 def test_a_wrong_number_is_noticed(rows):
     """The comparison does not pass what is no number of the library."""
     one, law = rows[0]

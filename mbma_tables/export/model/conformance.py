@@ -5,6 +5,7 @@ each result with the scale of its difference. Lines that begin with # describe t
 """
 
 import math
+import re
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 from mbma_tables.bodies.bodies import Bodies
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.contacts.contact import contact
-from mbma_tables.export.text import comment, number
+from mbma_tables.export.text import comment, number, template
 from mbma_tables.islands.geometry import FIELDS, geometry
 from mbma_tables.islands.variants import Variant
 from mbma_tables.surfaces.surface import Surface
@@ -29,19 +30,9 @@ Rows = Iterator[str]
 IslandTable = UniversalModel | Island4dModel
 FORM = "standard"  # the form of island model "formula"
 POINTS_FILE = "mbma_conformance.csv"
-# of `mbma_joint` of mbma_model.h; the second is of the file, the others of a contact
-JOINT = (
-    "force",
-    "area",
-    "stiffness",
-    "error",
-    "yielded",
-    "unloading_stiffness",
-    "tangential_stiffness",
-    "solid_conductance",
-    "plane_separation",
-    "flow_coefficient",
-)
+# fields of `mbma_joint`; the second is of the file, the others of a contact
+_JOINT = template("model/mbma_model.h").partition("} mbma_joint;")[0].rpartition("{")[2]
+JOINT = re.findall(r"\w+(?=[,;])", _JOINT)
 KINDS = {
     "geometry": f"approach, hurst, zeta_1; {', '.join(FIELDS)}",
     "total": "hurst, q0, q1, h_rms, h_max, separation, E_star, rtol; force, area, stiffness, error",

@@ -15,7 +15,7 @@ from mbma_tables.bodies.adhesion import Adhesion
 from mbma_tables.bodies.bodies import Bodies
 from mbma_tables.common.arguments import FloatArray, hinted, number_in, whole_number_in
 from mbma_tables.common.errors import InputError
-from mbma_tables.contacts.law.law import ROUNDING
+from mbma_tables.contacts.law.law import ROUNDING, ContactLaw
 from mbma_tables.contacts.quantities.effective_medium import LARGEST_AREA
 from mbma_tables.contacts.quantities.interface import NOTHING_BETWEEN, Interface
 from mbma_tables.contacts.quantities.leakage import (
@@ -59,6 +59,7 @@ OF_FRICTION = 5  # pressures at which a friction card's comments have the stiffn
 # of the largest value, where no range is given: below it, errors are relative to this, not
 # to the value
 FLOOR = 1e-3
+DIFFERENCE = 1e-5  # of h_max: between gaps whose flow is compared for a slope
 # points at which the error of a choice of rows is measured
 FINE = 20_001
 LAST = 2_001
@@ -295,6 +296,19 @@ def _curve(
     # near full compression pressure may diverge with the logarithm of the mean separation
     u = law.h_max * np.geomspace(max(1 - end / law.h_max, NEAREST_END), LAST_SHARE, LAST)
     c = np.union1d(c, law.h_max - u[1:-1]) if u[0] < u[-1] else c
+    return _values(exported, quantity, c, scale, gas)
+
+
+def _values(
+    exported: ExportedLaw,
+    quantity: str,
+    c: FloatArray,
+    scale: float,
+    gas: GasInGaps | None = None,
+) -> tuple[FloatArray, FloatArray]:
+    """What rows are against, and a quantity, at rising overclosures of which the first is that of no load."""
+    law = exported.law
+    begin = exported.begin
     d = law.h_max - 2 * np.maximum(c, begin)
     pressure = np.asarray(law.pressure(separation=d))
     stiffness = np.asarray(law.stiffness(separation=d))
@@ -419,7 +433,7 @@ def _table(
             above = f", from pressure {about(least)} {x_unit} on"
     if kappa is not None:
         # of a surface with a lay it depends on the contact area, and is known for some of them
-        fine_y[1:] /= np.asarray(kappa(np.asarray(law.at_pressure(fine_x[1:]).area)))
+        fine_y[1:] /= _ratios(law, fine_x[1:], kappa)
         floor = float(fine_y[1:].min()) * (1 - 1e-9)
     x, y, error = choose(fine_x, fine_y, floor, jump=slope or not exported.ends)
     why = (
@@ -437,6 +451,18 @@ def _table(
     of_others: list[str] = []
     if quantity == hydraulic_aperture.name:
         more, of_others = _of_aperture(exported, x, fine_x, fine_y, floor)
+    elif not power:
+        # a jump of the law between two fine points shows between two rows alone
+        middle = (x[2:] + x[1:-1]) / 2
+        if x_name == "pressure":
+            middle = (law.h_max - np.asarray(law.at_pressure(middle).separation)) / 2
+        between = _values(exported, quantity, np.append(0.0, middle), scale, gas)
+        between_x, between_y = (part[1:] for part in between)
+        if kappa is not None:
+            between_y = between_y / _ratios(law, between_x, kappa)
+        kept = between_y > floor
+        off = np.interp(between_x[kept], x, y) / between_y[kept] - 1
+        error = max(error, float(np.abs(off).max(initial=0.0)))
     columns = {y_name: (y, y_unit), **more}
     named = ", ".join(f"{name} [{unit}]" for name, (_, unit) in columns.items())
     comments = exported.header(
@@ -470,6 +496,13 @@ def _table(
         more,
         facts,
     )
+
+
+def _ratios(
+    law: ContactLaw, pressure: FloatArray, kappa: Callable[[Any], Any]
+) -> FloatArray:
+    """Normal over tangential stiffness at pressures."""
+    return np.asarray(kappa(np.asarray(law.at_pressure(pressure).area)))
 
 
 def _rows_of_registry(
@@ -585,9 +618,31 @@ def _of_aperture(
         error = np.abs(np.interp(fine_x[inside], x, values) / fine[name][inside] - 1).max(
             initial=0.0
         )
+        if name == "derivative":
+            # slopes of the law's polynomials are further from those of the theory than values
+            known = _derivative_of_aperture(exported, u[1:])
+            measured = np.isfinite(known) & (np.interp(x[1:], fine_x, fine_y) > floor)
+            off = np.abs(values[1:][measured] / known[measured] - 1).max(initial=0.0)
+            error = (1 + error) * (1 + off) - 1
         above = f"hydraulic_aperture {about(floor)} {exported.length}, from pressure {about(x[1])} {exported.stress} on"
         lines.append(_of_rows(name, x.size, float(error), above))
     return columns, lines
+
+
+def _derivative_of_aperture(exported: ExportedLaw, u: FloatArray) -> FloatArray:
+    """Of the hydraulic aperture by the mean separation, by the theory; NaN where a gap beside u is blocked."""
+    step = DIFFERENCE * exported.law.h_max
+    ends = (
+        np.minimum(u + step, exported.law.h_max - exported.begin),
+        np.maximum(u - step, u.min()),
+    )
+    apertures = []
+    for end in ends:
+        leakage = exported.answer(end).leakage
+        direction = exported.direction
+        K = np.asarray(leakage.K if direction is None else leakage.along(direction))
+        apertures.append(np.where(K > 0, np.cbrt(K), np.nan))
+    return np.asarray((apertures[0] - apertures[1]) / (ends[0] - ends[1]))
 
 
 def _range(
