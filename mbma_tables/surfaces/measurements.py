@@ -152,7 +152,8 @@ def _bytes_of_array(stream: Any) -> int:
     major, _ = layout.read_magic(stream)
     header = layout.read_array_header_1_0 if major == 1 else layout.read_array_header_2_0
     shape, _, kind = header(stream)
-    return math.prod(shape) * kind.itemsize
+    # objects have no size of their own
+    return 0 if kind.hasobject else math.prod(shape) * kind.itemsize
 
 
 def _refuse_mixed_marks(stream: Any, name: str) -> None:
