@@ -34,6 +34,7 @@ from mbma_tables.common.progress import doing, shown
 from mbma_tables.contacts.contact import contact
 from mbma_tables.contacts.quantities import registry
 from mbma_tables.contacts.quantities.declaration import DIMENSIONLESS
+from mbma_tables.contacts.quantities.leakage import flow_coefficient, hydraulic_aperture
 from mbma_tables.contacts.result import Contact, panel_label
 from mbma_tables.design.specimen import surface_of_entries
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -148,6 +149,14 @@ class Description:
         return middle
 
 
+def _has_uncertainty(name: str) -> bool:
+    """Whether a quantity has a model uncertainty of its own, or the flow's."""
+    declared = registry.get(name)
+    return name == hydraulic_aperture.name or (
+        declared.uncertainty is not None and declared.error_sign != 0
+    )
+
+
 def relative_scatter(pressed: Contact, name: str) -> Any:
     """Standard deviation of the model's error of ln of a quantity at a pressure, with its sign.
 
@@ -155,13 +164,18 @@ def relative_scatter(pressed: Contact, name: str) -> Any:
     area and stiffness correlate by 0.5 to 0.6, of stiffness and mean gap by -0.6 to -0.7, of
     area and mean gap by -0.2 to -0.3: a replica has one number for all of them. NaN where not known or not stated at a pressure.
     """
+    if name == hydraulic_aperture.name:
+        # it is the cube root of the flow coefficient
+        return relative_scatter(pressed, flow_coefficient.name) / 3
     declared = registry.get(name)
     if declared.uncertainty is None or not declared.error_sign:
         return np.nan * pressed.mean_separation
     kind = registry.get(declared.uncertainty).spread_of_process
     provenance = pressed.surface.provenance
     spread = spread_of_processes(provenance, kind) if kind else 0.0
-    if spread > 0 and not np.isfinite(pressed.scatter_of(name)).all():
+    # that of flow is about the gaps of a contact, and says nothing of those of a process
+    stated = np.isfinite(pressed.scatter_of(name)) & np.isfinite(pressed.scatter)
+    if spread > 0 and not stated.all():
         # no scatter is stated of faces of a process; maps of it have this one
         return declared.error_sign * spread + 0 * pressed.mean_separation
     scatter = pressed.scatter_of(name)
@@ -601,8 +615,7 @@ class ReplicaContact:
     def quantity(self, name: str) -> Any:
         """A quantity by its name."""
         value = self.contact.quantity(name)
-        declared = registry.get(name)
-        if declared.uncertainty is None or not declared.error_sign:
+        if not _has_uncertainty(name):
             return value
         return value * np.exp(self.model * relative_scatter(self.contact, name))
 

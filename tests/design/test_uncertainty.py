@@ -646,3 +646,21 @@ def test_commands_of_known_numbers_name_those_that_take_ranges():
         said = refused(*command, *base)
         assert "Ra = '0.4..0.5um' is a range" in said
         assert "mbma contact, joint and batch take ranges" in said
+
+
+def test_the_flow_of_faces_of_a_process_is_as_uncertain_as_the_cube_of_their_gap():
+    """It had the band of Gaussian faces, the gap one seven times as wide."""
+    face = {"Ra": "0.1 um", "process": "lapped"}
+    joint = Joint(face, face, bodies="steel 304 soft", nominal_area="3 cm^2")
+    names = ["mean_separation", "flow_coefficient", "hydraulic_aperture"]
+    drawn = joint.uncertainty("30 MPa", quantities=names)
+    gap, flow, aperture = (
+        np.log(drawn.quantiles[name][-1, 0] / drawn.quantiles[name][0, 0])
+        for name in names
+    )
+    assert flow == pytest.approx(3 * gap, rel=0.05)
+    assert aperture == pytest.approx(gap, rel=0.05)
+    replica = joint.replicas(2)[0].at_pressure("30 MPa")
+    assert replica.hydraulic_aperture == pytest.approx(
+        np.cbrt(replica.flow_coefficient), rel=1e-12
+    )

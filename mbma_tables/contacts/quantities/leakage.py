@@ -732,6 +732,7 @@ def hydraulic_aperture(contact: State) -> Any:
     DIMENSIONLESS,
     "model uncertainty: standard deviation of ln K",
     made_of=("flow_coefficient",),
+    spread_of_process="flow",
     is_column=False,
     is_listed=on_request,
 )
