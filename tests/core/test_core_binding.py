@@ -246,6 +246,8 @@ ASKED = """
 import signal, sys, time
 import numpy as np
 from mbma_tables import Surface, contact, contact_law, greenwood_tripp, open_table
+# a shell that starts the tests in the background has them ignore it
+signal.signal(signal.SIGINT, signal.default_int_handler)
 one, n = Surface(0.7, 0.2, 60.0, 1.0, 3.0), 100_000
 many = Surface(np.linspace(0.3, 1.0, n), 0.2, np.geomspace(0.7, 4000, n), 1.0, 3.0)
 u = np.linspace(0.2, 2.5, 3_000_000)
