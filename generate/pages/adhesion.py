@@ -29,34 +29,6 @@ WAFER = Surface(hurst=0.8, q0=0.01, q1=0.2, h_rms=0.2, h_max=0.7, unit="nm")
 WORKS = (100.0, 20.0, 5.0, 1.0)  # mJ/m^2
 SHOWN = (16, 17)  # seeds of held-out surfaces of the figure
 RANGE = 0.3  # over h_rms
-# what other commands measure
-OTHERS = [
-    [
-        "pull-off, Tabor's number 0.2",
-        "15%",
-        "11% to 18% too large, eight contacts, not `valid`",
-        "edges of contact neck beside pull-off: at Tabor's number 0.35 it is 1.3 to 2.6 times as large",
-    ],
-    [
-        "mean of $e^{-g/\\rho}$ on held-out surfaces",
-        "3%",
-        "1.3% (median), 69% within 3%",
-        "light contacts are few spots, which differ from cell to cell (`python -m generate gaps --fit`)",
-    ],
-    [
-        "adhesive solver against Tamaas: area, pressure",
-        "1e-3, 1e-4",
-        "1e-3, 1e-4",
-        "a test",
-    ],
-    [
-        "cost of a lookup over the elastic one",
-        "2",
-        "3.5 for one contact (0.4 ms), 3.0 for a hundred, 1.5 for two thousand",
-        "calls, not arithmetic (`python -m benchmarks adhesion`)",
-    ],
-    ["cost of a law", "as any", "as any: 0.1 ms for 2000 contacts", ""],
-]
 SHOWN_TABOR = 0.2
 
 
@@ -148,9 +120,13 @@ def _of_criteria() -> Figure:
     answers = [_stuck(float(each)) for each in work]
     share = np.array([part for _, part in answers])
     valid = np.array([found.valid for found, _ in answers])
-    axis.semilogx(work, share, "--", label="pull-off, not valid")
+    axis.semilogx(work, share, "--", label="pull-off")
     axis.semilogx(
-        work[valid], share[valid], "-", lw=2.5, label="pull-off, zero load valid"
+        work[valid],
+        share[valid],
+        "-",
+        lw=2.5,
+        label="pull-off where the contact at zero load is valid",
     )
     for k, one in enumerate(answers[0][0].criteria):
         over = [
@@ -199,7 +175,6 @@ def _reached(ranges: dict[tuple[str, int], str], table_of: pd.DataFrame) -> str:
             "the scatter has a part for such cells (`python -m generate adhesion --scatter`)",
         ],
         ["the same, mean gap", "92%", within["gap"], "likewise"],
-        *OTHERS,
     ]
     return table("what | asked | reached | why", rows)
 

@@ -133,6 +133,7 @@ def calibrated() -> Measured:
 
 
 def constants() -> Measured:
+    """The constants of the calibrated law, as docs/theories.md lists them."""
     return {"numbers": numbers(xr.load_dataset(shipped_file("calibrated.nc")).attrs)}, {}
 
 

@@ -330,13 +330,13 @@ def draw_profiles() -> Figure:
                 fmt="o",
                 markersize=3,
                 linewidth=0.8,
-                label=f"{sides} sides: {within[0]:.0%} and {within[1]:.0%} within 1 and 2",
+                label=f"{sides} sides: {within[0]:.0%} within one standard error, {within[1]:.0%} within two",
             )
         axis.axhline(1.0, color="black", linewidth=0.8)
         axis.set_xscale("log")
         axis.set_xlabel("longest wavelengths in the trace")
         axis.set_title(f"{title} of a trace over that of its map", fontsize="medium")
-        axis.legend(fontsize="small")
+        axis.legend(fontsize="x-small", loc="lower right")
     return figure
 
 

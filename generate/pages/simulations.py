@@ -566,6 +566,7 @@ class WideLoads(NamedTuple):
 
 
 def wide_loads(one: xr.Dataset) -> WideLoads:
+    """The calibrated law beside the loads of one surface of docs/data/bandwidth.nc."""
     solved = np.isfinite(one.force.values)
     area = one.area.values[solved].astype(float)
     u = one.mean_separation.values[solved].astype(float)

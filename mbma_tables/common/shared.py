@@ -1,12 +1,14 @@
 """Cached results that all callers share, with arrays that nobody can change."""
 
 import functools
+import weakref
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
 
 T = TypeVar("T")
+Owner = TypeVar("Owner")
 
 # attributes of surfaces are their maker's, who may go on changing the arrays that they were made of
 OF_USERS = "mbma_tables.surfaces"
@@ -53,6 +55,19 @@ def shared(
         return functools.lru_cache(maxsize)(made)
 
     return decorate
+
+
+def kept_with(make: Callable[[Owner], T]) -> Callable[[Owner], T]:
+    """Decorator: the result of an object is kept for as long as that object lives."""
+    kept: weakref.WeakKeyDictionary[Owner, T] = weakref.WeakKeyDictionary()
+
+    @functools.wraps(make)
+    def made(owner: Owner) -> T:
+        if owner not in kept:
+            kept[owner] = make(owner)
+        return kept[owner]
+
+    return made
 
 
 class shared_property(functools.cached_property[T]):

@@ -131,7 +131,7 @@ MBMA_INLINE double dot(const double *restrict a, const double *restrict b, size_
     return ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]));
 }
 
-/* k/u^3 of Gaussian gaps without contact, by the square of their mean over h_rms. */
+/* k/u^3 of Gaussian gaps without contact, at their mean u over h_rms. */
 MBMA_INLINE double mbma_wide_gap(double u) { return 1.0 - 1.5 / mbma_fma(u, u, 4.0); }
 
 /* Forces of the calibrated law end at h_max as a Hertzian contact does: F = F_G (1 - r)^(3/2)/(1 + r) with F_G that of a

@@ -217,6 +217,18 @@ class _SlopeTable:
     errors: FloatArray
     sides: NDArray[np.int8]  # (directions, contacts)
 
+    def put(
+        self,
+        pairs: tuple[NDArray[np.intp], ...],
+        chosen: NDArray[np.bool_],
+        slopes: FloatArray,
+        errors: FloatArray,
+    ) -> None:
+        """Write those of chosen quantities (quantities, pairs) at pairs of a direction and a contact."""
+        place, entry = pairs
+        for values, own in ((self.slopes, slopes), (self.errors, errors)):
+            values[place, :, entry] = np.where(chosen, own, values[place, :, entry].T).T
+
 
 @np.errstate(all="ignore")
 def derivatives_of(
@@ -557,11 +569,7 @@ class _Differences:
         slope = np.where(side > 0, sides[1].slope, sides[0].slope)
         place, entry = pairs
         keep = ~uneven
-        for values, own in (
-            (table.slopes, slope),
-            (table.errors, np.abs(sides[1].slope - sides[1].simpler)),
-        ):
-            values[place, :, entry] = np.where(keep, own, values[place, :, entry].T).T
+        table.put(pairs, keep, slope, np.abs(sides[1].slope - sides[1].simpler))
         table.sides[place, entry] = np.where(kinked, side, 0)
         if kinked.any():
             some = place[kinked], entry[kinked]
@@ -592,11 +600,11 @@ class _Differences:
             # nothing is defined so far on this side
             return
         place, entry = pairs
-        slope = np.tensordot(SIDE_WEIGHTS, found, 1) / step
-        apart = np.nan_to_num(np.abs(slope - table.slopes[place, :, entry].T))
-        errors = table.errors[place, :, entry].T
-        larger = np.where(chosen, np.maximum(errors, apart), errors)
-        table.errors[place, :, entry] = larger.T
+        far = np.tensordot(SIDE_WEIGHTS, found, 1) / step
+        slopes = table.slopes[place, :, entry].T
+        apart = np.nan_to_num(np.abs(far - slopes))
+        errors = np.maximum(table.errors[place, :, entry].T, apart)
+        table.put(pairs, chosen, slopes, errors)
 
     def _over_more(
         self,
@@ -607,7 +615,6 @@ class _Differences:
         chosen: NDArray[np.bool_],
     ) -> None:
         """Write slopes of polynomials over wide steps to the table, of values that are not smooth; NaN at jumps."""
-        place, entry = pairs
         try:
             found, _ = self._at_pairs(part, pairs, step, MANY)
         except (InputError, ConvergenceError):
@@ -621,11 +628,7 @@ class _Differences:
         of_number = step / (STEP * WIDE)
         size = np.maximum(np.abs(found).max(axis=0) / of_number, np.abs(slope))
         exists = error <= MAX_ERROR * size
-        for values, own in (
-            (table.slopes, np.where(exists, slope, np.nan)),
-            (table.errors, error),
-        ):
-            values[place, :, entry] = np.where(chosen, own, values[place, :, entry].T).T
+        table.put(pairs, chosen, np.where(exists, slope, np.nan), error)
 
     def _at_an_end(
         self, part: Mapping[str, FloatArray], values: FloatArray, steps: FloatArray

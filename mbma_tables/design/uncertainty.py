@@ -33,8 +33,8 @@ from mbma_tables.common.plots import Line, draw_panels, pressure_label
 from mbma_tables.common.progress import doing, shown
 from mbma_tables.contacts.contact import contact
 from mbma_tables.contacts.quantities import registry
-from mbma_tables.contacts.quantities.declaration import DIMENSIONLESS
-from mbma_tables.contacts.quantities.leakage import flow_coefficient, hydraulic_aperture
+from mbma_tables.contacts.quantities.declaration import DIMENSIONLESS, Quantity
+from mbma_tables.contacts.quantities.leakage import flow_coefficient, power_of_flow
 from mbma_tables.contacts.result import Contact, panel_label
 from mbma_tables.design.specimen import surface_of_entries
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -149,12 +149,13 @@ class Description:
         return middle
 
 
-def _has_uncertainty(name: str) -> bool:
-    """Whether a quantity has a model uncertainty of its own, or the flow's."""
+def _uncertain(name: str) -> tuple[Quantity, float]:
+    """The quantity whose model uncertainty one has, and the power of it that it is."""
     declared = registry.get(name)
-    return name == hydraulic_aperture.name or (
-        declared.uncertainty is not None and declared.error_sign != 0
-    )
+    power = power_of_flow(declared)
+    if declared.uncertainty is None and power > 0:
+        return flow_coefficient, power
+    return declared, 1.0
 
 
 def relative_scatter(pressed: Contact, name: str) -> Any:
@@ -164,25 +165,20 @@ def relative_scatter(pressed: Contact, name: str) -> Any:
     area and stiffness correlate by 0.5 to 0.6, of stiffness and mean gap by -0.6 to -0.7, of
     area and mean gap by -0.2 to -0.3: a replica has one number for all of them. NaN where not known or not stated at a pressure.
     """
-    if name == hydraulic_aperture.name:
-        # it is the cube root of the flow coefficient
-        return relative_scatter(pressed, flow_coefficient.name) / 3
-    declared = registry.get(name)
+    declared, power = _uncertain(name)
     if declared.uncertainty is None or not declared.error_sign:
         return np.nan * pressed.mean_separation
     kind = registry.get(declared.uncertainty).spread_of_process
     provenance = pressed.surface.provenance
     spread = spread_of_processes(provenance, kind) if kind else 0.0
-    # that of flow is about the gaps of a contact, and says nothing of those of a process
-    stated = np.isfinite(pressed.scatter_of(name)) & np.isfinite(pressed.scatter)
-    if spread > 0 and not stated.all():
+    scatter = pressed.scatter_of(declared.name)
+    if spread > 0 and not np.isfinite(scatter).all():
         # no scatter is stated of faces of a process; maps of it have this one
-        return declared.error_sign * spread + 0 * pressed.mean_separation
-    scatter = pressed.scatter_of(name)
+        return power * declared.error_sign * spread + 0 * pressed.mean_separation
     if registry.get(declared.uncertainty).dimension != DIMENSIONLESS:
         with np.errstate(divide="ignore", invalid="ignore"):
-            scatter = scatter / pressed.quantity(name)
-    return declared.error_sign * scatter
+            scatter = scatter / pressed.quantity(declared.name)
+    return power * declared.error_sign * scatter
 
 
 def names_by_default(pressed: Contact) -> list[str]:
@@ -615,7 +611,8 @@ class ReplicaContact:
     def quantity(self, name: str) -> Any:
         """A quantity by its name."""
         value = self.contact.quantity(name)
-        if not _has_uncertainty(name):
+        declared, _ = _uncertain(name)
+        if declared.uncertainty is None or not declared.error_sign:
             return value
         return value * np.exp(self.model * relative_scatter(self.contact, name))
 

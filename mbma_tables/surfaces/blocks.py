@@ -108,7 +108,7 @@ def read_by_blocks(
     coarse = tuple(side * step for step in steps)
     read = Treated(means, coarse, periodic, unit, confirmed=confirmed)
     left_out = [count % side for count in shape]
-    read = read.after(means, "blocks", _told(shape, side, left_out), side=side)
+    read = read.after(means, "blocks", _description(shape, side, left_out), side=side)
     together = tuple(_of_all_parts(found, len(every)) for found in seen.values())
     return dataclasses.replace(read, provenance=(*read.provenance, *together))
 
@@ -156,7 +156,8 @@ def _means(heights: Any, side: int) -> Any:
     return np.ma.masked_array(means, counts < LEAST_DEFINED * side * side)
 
 
-def _told(shape: tuple[int, ...], side: int, left_out: list[int]) -> str:
+def _description(shape: tuple[int, ...], side: int, left_out: list[int]) -> str:
+    """What was read of a map of this shape, and what was left out at its ends."""
     description = (
         f"{shape[0]} x {shape[1]} points were read as the means of blocks of {side} x {side}: "
         "shorter wavelengths are not in it"

@@ -351,7 +351,7 @@ def _flattened(treated: Treated, mode: str | None) -> Treated:
 
 
 def _form_left(flat: FloatArray, degree: int, least_bow: float) -> str:
-    """What is told of a tilt or a bow that a trend of that degree leaves in the heights."""
+    """The statement on a tilt or a bow that a trend of that degree leaves in the heights; empty without one."""
     variance = float(np.var(flat))
     for more, form, remedy, least in (
         (1, "tilt", "plane", FORM),

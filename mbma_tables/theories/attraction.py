@@ -6,7 +6,6 @@ for the end of contact, and is kept here as ln of it, piece by piece as pieces a
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from mbma_tables.common.arguments import FloatArray
+from mbma_tables.common.shared import kept_with
 from mbma_tables.surfaces.any_surface import AnySurface
 
 Mean = Callable[[FloatArray], FloatArray]
@@ -111,16 +111,16 @@ def knots_of(low: float, high: float, h_rms: float, h_max: float) -> FloatArray:
     return np.sort(np.concatenate([every[inside], ends]))
 
 
-_kept: weakref.WeakKeyDictionary[AnySurface, dict[Any, AttractionCurve]] = (
-    weakref.WeakKeyDictionary()
-)
+@kept_with
+def _curves_of(surface: AnySurface) -> dict[Any, AttractionCurve]:
+    return {}
 
 
 def kept_curve(
     surface: AnySurface, key: Any, make: Callable[[], AttractionCurve]
 ) -> AttractionCurve:
     """The curve of a surface and a key, made once while the surface lives."""
-    own = _kept.setdefault(surface, {})
+    own = _curves_of(surface)
     if key not in own:
         if len(own) >= MOST_KEPT:
             own.clear()

@@ -28,6 +28,7 @@ from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.common.units import Dimension, Units, factor
 from mbma_tables.contacts.quantities.declaration import (
     DIMENSIONLESS,
+    Quantity,
     on_request,
     quantity,
 )
@@ -193,7 +194,9 @@ class Leakage(Displayed):
             area = largest_area(by, surface, u, area)
             stated = shipped_flow().standard_deviation(by.elastic.name, area)
             if not isinstance(surface, MeasuredSurface) or surface.bearing is None:
-                return (stated,)
+                # none of surfaces unlike those that were simulated, as of the theory's own
+                is_unlike = bool(surface.departures())
+                return (np.full(stated.shape, np.nan) if is_unlike else stated,)
             # channels and walls of a map are not in its spectrum
             of_maps = LIKE_GAUSSIAN if not surface.departures(by_map=True) else OTHERS
             return (
@@ -726,6 +729,13 @@ def flow_coefficient(contact: State) -> Any:
 def hydraulic_aperture(contact: State) -> Any:
     """K^(1/3) [length], the gap of parallel plates with the same flow."""
     return contact.leakage.hydraulic_aperture
+
+
+def power_of_flow(declared: Quantity) -> float:
+    """The power of the flow coefficient that a quantity is; 0 of others."""
+    if declared.follows != flow_coefficient.name:
+        return 0.0
+    return declared.dimension.length / flow_coefficient.dimension.length
 
 
 @quantity(

@@ -19,8 +19,8 @@ from mbma_tables.contacts.law.law import ROUNDING, ContactLaw
 from mbma_tables.contacts.quantities.effective_medium import LARGEST_AREA
 from mbma_tables.contacts.quantities.interface import NOTHING_BETWEEN, Interface
 from mbma_tables.contacts.quantities.leakage import (
-    flow_coefficient,
     hydraulic_aperture,
+    power_of_flow,
 )
 from mbma_tables.contacts.quantities.registry import in_files, unit_of
 from mbma_tables.contacts.quantities.stiffnesses import unloading_stiffness
@@ -296,10 +296,10 @@ def _curve(
     # near full compression pressure may diverge with the logarithm of the mean separation
     u = law.h_max * np.geomspace(max(1 - end / law.h_max, NEAREST_END), LAST_SHARE, LAST)
     c = np.union1d(c, law.h_max - u[1:-1]) if u[0] < u[-1] else c
-    return _values(exported, quantity, c, scale, gas)
+    return _at_overclosures(exported, quantity, c, scale, gas)
 
 
-def _values(
+def _at_overclosures(
     exported: ExportedLaw,
     quantity: str,
     c: FloatArray,
@@ -316,7 +316,7 @@ def _values(
     if quantity == "pressure":
         return c, pressure
     rises = np.append(True, np.diff(pressure) > 0)
-    if power := power_of_flow(quantity):
+    if power := power_of_flow(in_files()[quantity]):
         flow = np.asarray(exported.leakage(separation=d))
         # the first row that is blocked is the last; what is not known has no row
         open_ = rises & np.append(True, flow[:-1] > 0) & ~np.isnan(flow)
@@ -333,13 +333,6 @@ def _values(
         # the gaps of first contact conduct, too
         values += gas.conductance(exported.answer(law.h_max - np.maximum(c, begin)))
     return pressure[rises], values[rises]
-
-
-def power_of_flow(quantity: str) -> float:
-    """The power of the flow coefficient that rows are; 0 of others."""
-    if follows(quantity) != flow_coefficient.name:
-        return 0.0
-    return in_files()[quantity].dimension.length / flow_coefficient.dimension.length
 
 
 def _friction(
@@ -404,7 +397,7 @@ def _table(
     fine_x, fine_y = _curve(exported, quantity, end, scale, gas)
     x_name = against(quantity)
     x_unit = unit_of(x_name, law.units)
-    power = power_of_flow(quantity)
+    power = power_of_flow(in_files()[quantity])
     y_name = quantity if exported.force is None else "force"
     floor = FLOOR * float(fine_y[-1])
     above = ""
@@ -433,7 +426,7 @@ def _table(
             above = f", from pressure {about(least)} {x_unit} on"
     if kappa is not None:
         # of a surface with a lay it depends on the contact area, and is known for some of them
-        fine_y[1:] /= _ratios(law, fine_x[1:], kappa)
+        fine_y[1:] /= _normal_over_tangential(law, fine_x[1:], kappa)
         floor = float(fine_y[1:].min()) * (1 - 1e-9)
     x, y, error = choose(fine_x, fine_y, floor, jump=slope or not exported.ends)
     why = (
@@ -456,10 +449,11 @@ def _table(
         middle = (x[2:] + x[1:-1]) / 2
         if x_name == "pressure":
             middle = (law.h_max - np.asarray(law.at_pressure(middle).separation)) / 2
-        between = _values(exported, quantity, np.append(0.0, middle), scale, gas)
+        overclosures = np.append(0.0, middle)
+        between = _at_overclosures(exported, quantity, overclosures, scale, gas)
         between_x, between_y = (part[1:] for part in between)
         if kappa is not None:
-            between_y = between_y / _ratios(law, between_x, kappa)
+            between_y = between_y / _normal_over_tangential(law, between_x, kappa)
         kept = between_y > floor
         off = np.interp(between_x[kept], x, y) / between_y[kept] - 1
         error = max(error, float(np.abs(off).max(initial=0.0)))
@@ -498,7 +492,7 @@ def _table(
     )
 
 
-def _ratios(
+def _normal_over_tangential(
     law: ContactLaw, pressure: FloatArray, kappa: Callable[[Any], Any]
 ) -> FloatArray:
     """Normal over tangential stiffness at pressures."""

@@ -11,7 +11,6 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-import weakref
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import ConvergenceError, OutOfRangeError
 from mbma_tables.common.interrupts import in_blocks
-from mbma_tables.common.shared import shared, shared_property
+from mbma_tables.common.shared import kept_with, shared, shared_property
 from mbma_tables.core import core
 from mbma_tables.islands.geometry import (
     floors_of,
@@ -58,21 +57,19 @@ Fields = Callable[[FloatArray, NDArray[np.bool_]], tuple[FloatArray, float]]
 Nodes = tuple[FloatArray, FloatArray, FloatArray, NDArray[np.int64]]
 
 
-# those of batches, which may be more than `_of_bands` keeps
-_spectra: weakref.WeakKeyDictionary[AnySurface, list[MeasuredSurface]] = (
-    weakref.WeakKeyDictionary()
-)
-
-
 def spectra_of(surface: AnySurface) -> list[MeasuredSurface]:
     """One surface given by its spectrum, or those of a batch of sums of power laws, in their order."""
     if isinstance(surface, MeasuredSurface):
         return [surface]
-    if surface not in _spectra:
-        numbers = np.broadcast_arrays(*surface.numbers().values())
-        rows = np.reshape(numbers, (len(numbers), -1)).T.tolist()
-        _spectra[surface] = [_of_bands(tuple(row)) for row in rows]
-    return _spectra[surface]
+    return _spectra_of_batch(surface)
+
+
+# of a batch, whose surfaces may be more than `_of_bands` keeps
+@kept_with
+def _spectra_of_batch(surface: AnySurface) -> list[MeasuredSurface]:
+    numbers = np.broadcast_arrays(*surface.numbers().values())
+    rows = np.reshape(numbers, (len(numbers), -1)).T.tolist()
+    return [_of_bands(tuple(row)) for row in rows]
 
 
 @shared(KEPT)
