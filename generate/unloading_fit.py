@@ -17,9 +17,10 @@ from mbma_tables.theories.yielding.unloading import (
     FRACTIONS,
     SHARES,
     Spots,
+    area_ratio,
     energy,
-    flattened,
-    lift,
+    raised,
+    stiffness_ratio,
 )
 
 FEWEST = 30  # points in contact, of rows that count
@@ -99,14 +100,14 @@ def predicted(rows: pd.DataFrame, stiffness: Spots, area: Spots) -> dict[str, Fl
     """What the law says of the rows."""
     c = {name: rows[name].to_numpy() for name in rows if rows[name].dtype == float}
     s = c["s"]
-    weight, *powers = stiffness.of(c["yielded"], c["peak_area"])
-    compliance = (1 - weight) / c["elastic_stiffness"] + weight / flattened(s, *powers)
-    lifted = (1 - weight) * c["elastic_lift"] + weight * lift(s, *powers)
-    given_back = (1 - weight) * c["elastic_energy"] + weight * energy(s, *powers)
-    weight, *powers = area.of(c["yielded"], c["peak_area"])
-    shrunk = c["elastic_area"] ** (1 - weight) * flattened(s, *powers) ** weight
-    found = {"stiffness": 1 / compliance, "lift": lifted, "area": shrunk}
-    return found | {"energy": given_back}
+    spots = stiffness.of(c["yielded"], c["peak_area"])
+    weight, *powers = spots
+    return {
+        "stiffness": stiffness_ratio(s, c["elastic_stiffness"], *spots),
+        "lift": raised(s, c["elastic_lift"], 1.0, *spots),
+        "area": area_ratio(s, c["elastic_area"], *area.of(c["yielded"], c["peak_area"])),
+        "energy": (1 - weight) * c["elastic_energy"] + weight * energy(s, *powers),
+    }
 
 
 def deviations(

@@ -1052,6 +1052,59 @@ static bool do_yielding_planes(const argument *a, long long *answer) {
     return true;
 }
 
+static bool do_flat_spots(const argument *a, long long *answer) {
+    enum { YIELDED, AREA, LAW, WEIGHT, POWER, EXPONENT };
+    *answer = (long long)mbma_flat_spots(a[YIELDED].count, a[YIELDED].items, a[AREA].items, a[LAW].items,
+                                         a[WEIGHT].items, a[POWER].items, a[EXPONENT].items);
+    return true;
+}
+
+static bool do_flattened(const argument *a, long long *answer) {
+    enum { S, POWER, EXPONENT, SHARE };
+    *answer = (long long)mbma_flattened(a[S].count, a[S].items, a[POWER].items, a[EXPONENT].items,
+                                        a[SHARE].items);
+    return true;
+}
+
+static bool do_flat_integrals(const argument *a, long long *answer) {
+    enum { S, POWER, EXPONENT, OF_ENERGY, INTEGRAL };
+    *answer = (long long)mbma_flat_integrals(a[S].count, a[S].items, a[POWER].items,
+                                             a[EXPONENT].items, a[OF_ENERGY].whole != 0,
+                                             a[INTEGRAL].items);
+    return true;
+}
+
+static bool do_unloaded_stiffnesses(const argument *a, long long *answer) {
+    enum { S, ELASTIC, WEIGHT, POWER, EXPONENT, RATIO };
+    *answer = (long long)mbma_unloaded_stiffnesses(a[S].count, a[S].items, a[ELASTIC].items,
+                                                   a[WEIGHT].items, a[POWER].items,
+                                                   a[EXPONENT].items, a[RATIO].items);
+    return true;
+}
+
+static bool do_unloaded_areas(const argument *a, long long *answer) {
+    enum { S, ELASTIC, WEIGHT, POWER, EXPONENT, RATIO };
+    *answer = (long long)mbma_unloaded_areas(a[S].count, a[S].items, a[ELASTIC].items,
+                                             a[WEIGHT].items, a[POWER].items, a[EXPONENT].items,
+                                             a[RATIO].items);
+    return true;
+}
+
+static bool do_unloaded_gaps(const argument *a, long long *answer) {
+    enum { S, ELASTIC, DEPTH, WEIGHT, POWER, EXPONENT, RAISED };
+    *answer = (long long)mbma_unloaded_gaps(a[S].count, a[S].items, a[ELASTIC].items,
+                                            a[DEPTH].items, a[WEIGHT].items, a[POWER].items,
+                                            a[EXPONENT].items, a[RAISED].items);
+    return true;
+}
+
+static bool do_unloaded_flows(const argument *a, long long *answer) {
+    enum { BEFORE, RAISED, GAP, OPENING, FLOW };
+    *answer = (long long)mbma_unloaded_flows(a[BEFORE].count, a[BEFORE].items, a[RAISED].items,
+                                             a[GAP].items, a[OPENING].real, a[FLOW].items);
+    return true;
+}
+
 /* ---- all functions ---- */
 
 /* Names of the functions `do_...`, which return whether the sizes and numbers of their arguments
@@ -1117,6 +1170,13 @@ static bool do_yielding_planes(const argument *a, long long *answer) {
     FN(tangential_ratios, "Dn Dn wn") \
     FN(tangential_stiffnesses, "Dn Dn wn") \
     FN(solid_conductances, "Dn Dn Dn wn") \
-    FN(yielding_planes, "Dn Dn Dn D11 wn")
+    FN(yielding_planes, "Dn Dn Dn D11 wn") \
+    FN(flat_spots, "Dn Dn D10 wn wn wn") \
+    FN(flattened, "Dn Dn Dn wn") \
+    FN(flat_integrals, "Dn Dn Dn i wn") \
+    FN(unloaded_stiffnesses, "Dn Dn Dn Dn Dn wn") \
+    FN(unloaded_areas, "Dn Dn Dn Dn Dn wn") \
+    FN(unloaded_gaps, "Dn Dn Dn Dn Dn Dn wn") \
+    FN(unloaded_flows, "Dn Dn Dn d wn")
 
 #endif

@@ -499,6 +499,39 @@ size_t mbma_solid_conductances(size_t n, const double *stiffness, const double *
 size_t mbma_yielding_planes(size_t n, const double *u, const double *load, const double *eta,
                             const mbma_hardness_law *law, double *gap);
 
+/* A contact below the largest pressure p0 that it was under, at s = p/p0: elastic unloading of flattened spots with a weight
+ * w, and of the surface without yielding; docs/yield.md has the equations. w, a and b depend on the yielded share of the
+ * contact at p0 and on its area, A/A0, which counts between `least_area` and `most_area`. */
+typedef struct {
+    double weight, power, power_elastic, power_area, exponent, exponent_elastic, exponent_area, area, least_area,
+        most_area;
+} mbma_spots_law;
+
+size_t mbma_flat_spots(size_t n, const double *yielded, const double *area, const mbma_spots_law *law, double *weight,
+                       double *power, double *exponent);
+
+/* [1 - (1-s)^a]^b, stiffness or area of flattened spots over that at p0, a = power > 0 and 0 <= b = exponent < 1; and the
+ * integral of 1 over this from s to 1, or of s over it from 0 to s. */
+size_t mbma_flattened(size_t n, const double *s, const double *power, const double *exponent, double *share);
+size_t mbma_flat_integrals(size_t n, const double *s, const double *power, const double *exponent, int of_energy,
+                           double *integral);
+
+/* Stiffness and area over those at p0, by the elastic ones at the same pressures over those at p0. */
+size_t mbma_unloaded_stiffnesses(size_t n, const double *s, const double *elastic, const double *weight,
+                                 const double *power, const double *exponent, double *ratio);
+size_t mbma_unloaded_areas(size_t n, const double *s, const double *elastic, const double *weight, const double *power,
+                           const double *exponent, double *ratio);
+
+/* Mean gaps less that at p0, by `elastic`, that difference of the elastic contact times its stiffness at p0 over that of
+ * unloading there, and `depth`, p0 over the latter. */
+size_t mbma_unloaded_gaps(size_t n, const double *s, const double *elastic, const double *depth, const double *weight,
+                          const double *power, const double *exponent, double *raised);
+
+/* Flow coefficients over h_rms^3 at mean gaps u, `raised` above those under the largest pressure, where the coefficients
+ * were `before`: the aperture opens as `opening` times the mean gap. NaN where flow was blocked. */
+size_t mbma_unloaded_flows(size_t n, const double *before, const double *raised, const double *u, double opening,
+                           double *flow);
+
 #ifdef __cplusplus
 }
 #endif

@@ -25,6 +25,7 @@
 #define MOST_ETA 1e100
 #define MOST_RATIO 1e300
 #define MOST_STEPS 60 /* of Newton's method, which needs fewer than ten */
+#define MOST_TERMS 200 /* of a series in powers of at most 1/2, which needs about fifty */
 
 #define ROOT_HALF 0.70710678118654752440
 #define ROOT_TWO 1.41421356237309504880
@@ -364,6 +365,138 @@ size_t mbma_yielding_planes(size_t n, const double *u, const double *load, const
             flattened = x < 1.0 ? whole(1, level_of_share(x)) : INFINITY;
         gap[k] = u[k] - flattened * exp(-(law->plane_eta - law->plane_load * x) * eta[k]);
         bad += gap[k] != gap[k];
+    }
+    return bad;
+}
+
+/* ---- after a larger pressure -------------------------------------------------------------------- */
+
+/* s = p/p0 is the pressure over the largest one, and [1 - (1-s)^a]^b the stiffness, or the area, of
+ * flattened spots over that at s = 1, with 0 < b < 1. */
+static double flattened(double s, double a, double b) {
+    return s >= 0.0 && s <= 1.0 ? pow(-expm1(a * log1p(-s)), b) : NAN;
+}
+
+/* B_x(p, q)/x^p, the incomplete beta function: sum_n (1-q)_n/n! x^n/(p+n), for x up to 1/2 */
+static double beta_series(double p, double q, double x) {
+    double factor = 1.0, sum = 1.0 / p;
+    for (int n = 1; n < MOST_TERMS; n++) {
+        factor *= (n - q) / n * x;
+        const double term = factor / (p + n);
+        sum += term;
+        if (!(fabs(term) > NEGLIGIBLE * fabs(sum)))
+            break;
+    }
+    return sum;
+}
+
+/* Integral of (1-t)^(order-1)/[1 - (1-t)^a]^b over t from s to 1: B_x(order/a, 1-b)/a with x = (1-s)^a */
+static double moment(double s, double a, double b, int order) {
+    const double p = order / a, q = 1.0 - b, y = -expm1(a * log1p(-s)), x = 1.0 - y;
+    if (x <= 0.5)
+        return pow(1.0 - s, order) * beta_series(p, q, x) / a;
+    const double all = pow(0.5, p) * beta_series(p, q, 0.5) + pow(0.5, q) * beta_series(q, p, 0.5);
+    return (all - pow(y, q) * beta_series(q, p, y)) / a;
+}
+
+/* Integral of t/[1 - (1-t)^a]^b over t from 0 to s. For small s the series of both its parts, of 1 and of
+ * 1 - t, are subtracted term by term, as they agree in the first. */
+static double flat_energy(double s, double a, double b) {
+    const double q = 1.0 - b, y = -expm1(a * log1p(-s));
+    if (y > 0.5)
+        return moment(0.0, a, b, 1) - moment(0.0, a, b, 2) - moment(s, a, b, 1) + moment(s, a, b, 2);
+    double one = 1.0, rest = 1.0, sum = 0.0;
+    for (int n = 1; n < MOST_TERMS; n++) {
+        one *= (n - 1.0 / a) / n * y;
+        rest *= (n - 2.0 / a) / n * y;
+        const double term = (one - rest) / (q + n);
+        sum += term;
+        if (!(fabs(term) > NEGLIGIBLE * fabs(sum)))
+            break;
+    }
+    return pow(y, q) * sum / a;
+}
+
+size_t mbma_flattened(size_t n, const double *s, const double *power, const double *exponent, double *share) {
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        share[k] = flattened(s[k], power[k], exponent[k]);
+        bad += share[k] != share[k];
+    }
+    return bad;
+}
+
+size_t mbma_flat_integrals(size_t n, const double *s, const double *power, const double *exponent, int of_energy,
+                           double *integral) {
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        const double a = power[k], b = exponent[k];
+        const int good = s[k] >= 0.0 && s[k] <= 1.0 && a > 0.0 && a < INFINITY && b >= 0.0 && b < 1.0;
+        integral[k] = !good ? NAN : of_energy ? flat_energy(s[k], a, b) : moment(s[k], a, b, 1);
+        bad += integral[k] != integral[k];
+    }
+    return bad;
+}
+
+size_t mbma_flat_spots(size_t n, const double *yielded, const double *area, const mbma_spots_law *law, double *weight,
+                       double *power, double *exponent) {
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        const double load = log(mbma_held(area[k], law->least_area, law->most_area) / law->area);
+        const double rest = 1.0 - yielded[k];
+        const double steep = law->power + law->power_elastic * rest + law->power_area * load;
+        const double logit = law->exponent + law->exponent_elastic * rest + law->exponent_area * load;
+        weight[k] = pow(yielded[k], law->weight);
+        power[k] = 1.0 + exp(steep);
+        exponent[k] = 1.0 / (1.0 + exp(-logit));
+        bad += weight[k] != weight[k] || power[k] != power[k] || exponent[k] != exponent[k];
+    }
+    return bad;
+}
+
+size_t mbma_unloaded_stiffnesses(size_t n, const double *s, const double *elastic, const double *weight,
+                                 const double *power, const double *exponent, double *ratio) {
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        const double w = weight[k], flat = flattened(s[k], power[k], exponent[k]);
+        ratio[k] = s[k] == 0.0 ? 0.0 : 1.0 / ((1.0 - w) / elastic[k] + w / flat);
+        bad += ratio[k] != ratio[k];
+    }
+    return bad;
+}
+
+size_t mbma_unloaded_areas(size_t n, const double *s, const double *elastic, const double *weight, const double *power,
+                           const double *exponent, double *ratio) {
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        const double w = weight[k], flat = flattened(s[k], power[k], exponent[k]);
+        ratio[k] = s[k] == 0.0 ? 0.0 : pow(elastic[k], 1.0 - w) * pow(flat, w);
+        bad += ratio[k] != ratio[k];
+    }
+    return bad;
+}
+
+size_t mbma_unloaded_gaps(size_t n, const double *s, const double *elastic, const double *depth, const double *weight,
+                          const double *power, const double *exponent, double *raised) {
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        const double w = weight[k], share = s[k];
+        const double flat = share >= 0.0 && share <= 1.0 ? moment(share, power[k], exponent[k], 1) : NAN;
+        raised[k] = (1.0 - w) * elastic[k] + w * flat * depth[k];
+        bad += raised[k] != raised[k];
+    }
+    return bad;
+}
+
+size_t mbma_unloaded_flows(size_t n, const double *before, const double *raised, const double *u, double opening,
+                           double *flow) {
+    size_t bad = 0;
+    for (size_t k = 0; k < n; k++) {
+        const double gap = u[k], aperture = cbrt(before[k]) + opening * raised[k];
+        const double open = gap * gap * gap * mbma_wide_gap(gap);
+        /* channels of a contact that was blocked are not known */
+        flow[k] = before[k] > 0.0 ? mbma_min(aperture * aperture * aperture, open) : NAN;
+        bad += flow[k] != flow[k];
     }
     return bad;
 }

@@ -184,6 +184,10 @@ def use():
     assert (found.plane_separation < found.mean_separation).any()
     yielded = contact(one, Bodies(hardness=0.05), pressure=1e-3, theory="calibrated")
     assert yielded.flow_coefficient > 0
+    after = {"largest_pressure": 2e-3, "theory": "calibrated"}
+    pressed = contact(one, Bodies(hardness=0.05), pressure=[1e-3, 5e-4], **after)
+    assert pressed.energy.all()
+    assert pressed.flow_coefficient.all()
     assert found.yielded.any()
     assert (found.unloading_stiffness > found.stiffness).any()
     bearing_share(np.linspace(0.0, 3.5, 30), 3.0)

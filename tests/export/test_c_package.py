@@ -17,7 +17,7 @@ from mbma_tables.theories import Mbma
 
 # kinds of points that the programs below replay: calls with one answer
 KINDS = ("phi", "geometry", "total", "formula", "calibrated", "separation")
-KINDS += ("joint", "joint_separation")
+KINDS += ("joint", "joint_separation", "unloaded", "unloaded_separation")
 
 CONSUMER = """
 cmake_minimum_required(VERSION 3.15)
@@ -43,15 +43,16 @@ FORTRAN = """
 program replay
   use mbma
   implicit none
-  character(16) :: kind
+  character(24) :: kind
   integer :: given, status, k, unit
-  real(c_double) :: v(10), answer(14), d
+  real(c_double) :: v(11), answer(14), d
   type(mbma_answer) :: phi
   type(mbma_island) :: island
   type(mbma_contact) :: contact, contacts(2)
   type(mbma_surface) :: surface
   type(mbma_bodies) :: bodies
   type(mbma_joint) :: joint
+  type(mbma_peak) :: peak
   real(c_double), allocatable :: spectrum(:)
   open (newunit=unit, file="points.txt", status="old")
   do
@@ -86,6 +87,14 @@ program replay
     case ("joint_separation")
       status = mbma_joint_separation_of(surface, bodies, v(10), d)
       answer(1) = d
+    case ("unloaded")
+      if (mbma_peak_of(surface, bodies, v(10), peak) /= MBMA_OK) stop 9
+      status = mbma_unloaded_of(surface, bodies, peak, v(11), joint)
+      answer(:size(transfer(joint, answer))) = transfer(joint, answer)
+    case ("unloaded_separation")
+      if (mbma_peak_of(surface, bodies, v(10), peak) /= MBMA_OK) stop 9
+      status = mbma_unloaded_separation_of(surface, bodies, peak, v(11), d)
+      answer(1) = d
     end select
     print "(i0, 14(1x, es25.17e3))", status, answer
   end do
@@ -111,6 +120,10 @@ fn main() {
         let v: Vec<f64> = words[2..].iter().map(|word| word.parse().unwrap()).collect();
         let surface = || mbma::Surface { hurst: v[0], q0: v[1], q1: v[2], h_rms: v[3], h_max: v[4] };
         let bodies = || mbma::Bodies { E_star: v[5], hardness: v[6], nu: v[7], conductivity: v[8] };
+        let joint = |j: mbma::Joint| vec![
+            j.force, j.area, j.stiffness, j.error, j.yielded, j.unloading_stiffness, j.tangential_stiffness,
+            j.solid_conductance, j.plane_separation, j.flow_coefficient];
+        let peak = || mbma::peak_of(&surface(), &bodies(), v[9]).unwrap();
         let of = |c: mbma::Contact| vec![c.force, c.area, c.stiffness, c.error];
         let answer = match words[0] {
             "phi" => mbma::phi_of(v[0], v[1]).map(|a| vec![a.phi_F, a.phi_A, a.error]),
@@ -120,9 +133,9 @@ fn main() {
                 i.width]),
             "total" => mbma::total_of(&surface(), v[5], v[6], v[7]).map(of),
             "calibrated" => mbma::calibrated_of(&surface(), v[5], v[6]).map(of),
-            "joint" => mbma::joint_of(&surface(), &bodies(), v[9]).map(|j| vec![
-                j.force, j.area, j.stiffness, j.error, j.yielded, j.unloading_stiffness, j.tangential_stiffness,
-                j.solid_conductance, j.plane_separation, j.flow_coefficient]),
+            "joint" => mbma::joint_of(&surface(), &bodies(), v[9]).map(joint),
+            "unloaded" => mbma::unloaded_of(&surface(), &bodies(), &peak(), v[10]).map(joint),
+            "unloaded_separation" => mbma::unloaded_separation_of(&surface(), &bodies(), &peak(), v[10]).map(|d| vec![d]),
             "joint_separation" => mbma::joint_separation_of(&surface(), &bodies(), v[9]).map(|d| vec![d]),
             _ => mbma::calibrated_separation_of(&surface(), v[5], v[6]).map(|d| vec![d]),
         }.unwrap();

@@ -43,6 +43,8 @@ TOLERANCES |= {"calibrated": 1e-12, "separation": 1e-12}  # whose logarithm is t
 TOLERANCES |= {
     "joint": 1e-11,
     "joint_separation": 1e-11,
+    "unloaded": 1e-11,
+    "unloaded_separation": 1e-11,
 }  # two of them one after the other
 MODEL = [name for name in SOURCES if name != SELFTEST]
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
@@ -237,6 +239,7 @@ def test_c_replays_its_points(c_folder, tmp_path):
     fixed = {"phi": 64, "geometry": 24, "status": 10}
     fixed |= dict.fromkeys(("total", "calibrated", "separation"), 12)
     fixed |= dict.fromkeys(("joint", "joint_separation"), 36)
+    fixed |= {"unloaded": 54, "unloaded_separation": 45}
     assert found.points == fixed | {"formula": found.points["formula"]}
     assert found.points["formula"] > 5
 
@@ -388,6 +391,34 @@ def test_no_answer_has_a_status_and_nan(c_folder, tmp_path):
     answers, said = at_force(*steel, 0.2)
     assert said == b"the table of the theory does not hold such a surface"
     assert np.isnan(answers).all()
+    # contacts after a largest force, which is below the hardness; twenty-one numbers
+    at_peak = functools.partial(joint, library.mbma_peak_of, 21)
+    table = b"the table of the theory does not hold such a surface"
+    for largest, message in ((0.2, table), (0.0, invalid), (nan, invalid)):
+        answers, said = at_peak(*steel, largest)
+        assert said == message
+        assert np.isnan(answers).all()
+    peak, said = at_peak(*steel, 0.05)
+    assert (np.isfinite(peak).all(), said) == (True, b"no error")
+
+    def after(function, count, number, peak=peak):
+        """Answers and the meaning of the status of a contact after the largest force."""
+        answers, given = np.empty(count), (np.array(steel[:5]), np.array(steel[5:]), peak)
+        places = [ctypes.c_void_p(array.ctypes.data) for array in given]
+        written = ctypes.c_void_p(answers.ctypes.data)
+        status = function(*places, ctypes.c_double(number), written)
+        return answers, library.mbma_message(status)
+
+    for number in (0.0, nan, inf):
+        answers, said = after(library.mbma_unloaded_of, len(conformance.JOINT), number)
+        assert said == invalid
+        assert np.isnan(answers).all()
+    for number, given in ((-1.0, peak), (nan, peak), (0.01, np.full(21, nan))):
+        answers, said = after(library.mbma_unloaded_separation_of, 1, number, given)
+        assert said == invalid
+        assert np.isnan(answers).all()
+    answers, said = after(library.mbma_unloaded_separation_of, 1, 0.2)
+    assert (np.isnan(answers).all(), said) == (True, table)
     # what is not known is NaN alone
     answers, said = at_gap(*steel[:7], nan, nan, 1.0)
     missing = [

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from mbma_tables.common.arguments import (
     FloatArray,
     Numbers,
+    answered,
     filled,
     finite_array,
     is_labelled,
@@ -403,11 +404,8 @@ def flow_of_contact(
     smaller = shipped_flow().constants.elastic_area(area0, np.nan_to_num(yielded))
     before = flow(surface, u0, smaller)
     h_rms = np.asarray(surface.h_rms)
-    aperture = np.cbrt(before) + OPENING * (u - u0) / h_rms
-    # of faces that hardly touch it is that of their mean gap
-    gap = u / h_rms
-    after = np.minimum(aperture**3, gap**3 * wide_gap(gap))
-    return np.where(unloads, np.where(before > 0, after, np.nan), k)
+    given = before, (u - u0) / h_rms, u / h_rms
+    return np.where(unloads, answered(core.unloaded_flows, given, 1, OPENING)[0], k)
 
 
 def unloading_from(theory: Any, surface: Any, u: FloatArray) -> tuple[Any, Any]:

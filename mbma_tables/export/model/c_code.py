@@ -24,7 +24,7 @@ from mbma_tables.bodies.materials import ISOTROPIC_SHARE
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.files import write_file
-from mbma_tables.contacts.quantities.leakage import shipped_flow
+from mbma_tables.contacts.quantities.leakage import OPENING, shipped_flow
 from mbma_tables.export.model.bindings import binding_texts
 from mbma_tables.export.model.conformance import (
     FORM,
@@ -59,6 +59,7 @@ from mbma_tables.theories.mbma.closed_forms import FUNCTIONS
 from mbma_tables.theories.mbma.models import get_model
 from mbma_tables.theories.mbma.sums import QUADRATURE_SHARE
 from mbma_tables.theories.yielding import formulas as yielding
+from mbma_tables.theories.yielding import unloading
 
 CORE = (
     "totals.c",
@@ -190,6 +191,8 @@ def model_texts(heads: dict[str, str], is_of_four: bool = False) -> dict[str, st
         "PERSSON_ERROR": number(persson.INVERSE_RTOL),
         "ISOTROPIC_SHARE": number(ISOTROPIC_SHARE),
         "REACHED": number(REACHED),
+        "LEAST_RATIO": number(unloading.LEAST),
+        "OPENING": number(OPENING),
     }
     return {
         name: filled(f"model/{name}", **parts, HEADER=heads[name])
@@ -291,6 +294,12 @@ def data_text(model: IslandTable, variant: Variant, later: bool = False) -> str:
         "mbma_hardness_law HARDNESS": braces(
             *numerals(np.array(dataclasses.astuple(yielding.CONSTANTS)))
         ),
+        "mbma_spots_law SPOTS[]": braces(
+            *(
+                braces(*numerals(spots.numbers()))
+                for spots in (unloading.STIFFNESS, unloading.CONTACT)
+            )
+        ),
         "mbma_variant MBMA_VARIANT": _variant(variant.numbers),
     }
     lines_of_flow = []
@@ -316,6 +325,7 @@ def data_text(model: IslandTable, variant: Variant, later: bool = False) -> str:
         "const mbma_variant *mbma_model_variant(void) { return &MBMA_VARIANT; }",
         "const mbma_law_constants *mbma_theory(int theory) { return &THEORIES[theory == MBMA_CALIBRATED]; }",
         "const mbma_hardness_law *mbma_hardness(void) { return &HARDNESS; }",
+        "const mbma_spots_law *mbma_spots(int of_area) { return &SPOTS[of_area != 0]; }",
         *lines_of_flow,
     ]
     return "\n".join([*lines, ""])
@@ -601,7 +611,8 @@ TARGETS = (
         ModelOptions,
         output=(
             "the whole model, C11: the table, island geometry, totals, the closed "
-            "forms; the calibrated law, with a hardness too, and Persson's theory"
+            "forms; the calibrated law, with a hardness and after a larger pressure too, "
+            "and Persson's theory"
         ),
         outside="NaN, and a status",
         tested=(

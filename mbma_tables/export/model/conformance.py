@@ -47,11 +47,19 @@ KINDS = {
     "joint_separation": (
         "hurst, q0, q1, h_rms, h_max, E_star, hardness, nu, conductivity, force; mean separation"
     ),
+    "unloaded": (
+        "hurst, q0, q1, h_rms, h_max, E_star, hardness, nu, conductivity, largest force, mean separation; "
+        f"{', '.join(JOINT)}"
+    ),
+    "unloaded_separation": (
+        "hurst, q0, q1, h_rms, h_max, E_star, hardness, nu, conductivity, largest force, force; mean separation"
+    ),
 }
 # of the first kind, "phi" or of a table of four numbers "lookup"
 PHI = "X, mu; phi_F, phi_A, the bound on their error"
 LOOKUP = "delta/h_rms, zeta_d, zeta_u, hurst; F_hat, A_hat, the bound on their error"
 TOLERANCE = 1e-11
+SMALLEST = 1e-300
 ANY = 1e300  # what the difference of a number that may be any is relative to
 # of mbma.h
 OK = 0
@@ -70,6 +78,10 @@ SURFACES = (
 )
 DEPTHS = (0.05, 0.3, 0.8, 1.4)  # (h_max - d)/h_max
 SHARES = (0.02, 0.3, 0.7, 0.99)  # u/h_max
+# places on the way from the contact under the largest force to last contact; one is of first loading
+LIFTED = (-0.2, 0.02, 0.3, 0.9, 1 - 1e-9, 1.01)
+# what goes to zero there
+LIGHT = frozenset(JOINT) - {"error", "yielded", "plane_separation", "flow_coefficient"}
 # hardness over E* times the rms gradient, Poisson's ratio and mean conductivity
 BODIES = ((0.03, 0.3, 45.0), (0.4, 0.0, 0.2), (math.inf, 0.5, 400.0))
 RTOL = 1e-8
@@ -181,12 +193,58 @@ def surface_rows(
 def joint_rows(
     surface: tuple[float, ...], numbers: tuple[float, ...], u: FloatArray
 ) -> Rows:
-    """Contacts with a hardness at mean separations, and the separations at their forces."""
+    """Contacts with a hardness at mean separations and the separations at their forces, and so after one of them."""
     E_star, hardness, nu, conductivity = numbers
     bodies = Bodies(E_star, hardness=hardness, nu=nu, conductivity=conductivity)
-    found = contact(Surface(*surface), bodies, mean_separation=u, theory="calibrated")
+    found: Any = contact(
+        Surface(*surface), bodies, mean_separation=u, theory="calibrated"
+    )
+    values, scales = joint_values(found)
+    yield from rows("joint", (*surface, *numbers, u), values, scales)
+    # which rounding of the force moves by as much of this
+    least = np.maximum(u, found.pressure / found.stiffness)
+    given = (*surface, *numbers, found.pressure)
+    yield from rows("joint_separation", given, (u,), (least,))
+    middle = u.size // 2
+    yield from unloaded_rows(surface, numbers, found.pressure[middle], u[middle])
+
+
+def unloaded_rows(
+    surface: tuple[float, ...], numbers: tuple[float, ...], largest: float, deepest: float
+) -> Rows:
+    """Contacts after a largest force and the mean separation under it, and the separations at their forces."""
+    E_star, hardness, nu, conductivity = numbers
+    bodies = Bodies(
+        E_star,
+        hardness=hardness,
+        nu=nu,
+        conductivity=conductivity,
+        largest_pressure=largest,
+    )
+    face = Surface(*surface)
+    end: Any = contact(face, bodies, pressure=0.0, theory="calibrated")
+    last = end.mean_separation
+    u = deepest + (last - deepest) * np.array(LIFTED)
+    found: Any = contact(face, bodies, mean_separation=u, theory="calibrated")
+    values, scales = joint_values(found)
+    # rounding of the distance to last contact counts
+    share = np.maximum(1.0, u / np.maximum(last - u, SMALLEST))
+    scales = [
+        scale * share if name in LIGHT else scale
+        for name, scale in zip(JOINT, scales, strict=True)
+    ]
+    given = (*surface, *numbers, largest)
+    yield from rows("unloaded", (*given, u), values, scales)
+    touching = found.pressure > 0
+    force, moved = found.pressure[touching], u[touching]
+    least = np.maximum(moved, force / found.stiffness[touching])
+    yield from rows("unloaded_separation", (*given, force), (moved,), (least,))
+
+
+def joint_values(found: Any) -> tuple[list[Any], list[Any]]:
+    """Results of a contact in the order of `JOINT`, and the scales of their differences."""
     values = [
-        np.zeros(u.size)
+        np.zeros(found.pressure.size)
         if name == "error"
         else getattr(found, "pressure" if name == "force" else name)
         for name in JOINT
@@ -195,11 +253,7 @@ def joint_rows(
         ANY if name == "error" else np.abs(value)
         for name, value in zip(JOINT, values, strict=True)
     ]
-    yield from rows("joint", (*surface, *numbers, u), values, scales)
-    # which rounding of the force moves by as much of this
-    least = np.maximum(u, found.pressure / found.stiffness)
-    given = (*surface, *numbers, found.pressure)
-    yield from rows("joint_separation", given, (u,), (least,))
+    return values, scales
 
 
 def universal_rows(model: UniversalModel) -> Rows:

@@ -10,7 +10,8 @@ that yielded: ::
     A/A0    = [A_e(p)/A_e(p0)]^(1-v) [1 - (1-s)^c]^(v d)
     u - u0  = (1 - w) [u_e(p) - u_e(p0)] K_e(p0)/K0 + w (p0/K0) int_s^1 [1 - (1-t)^a]^-b dt
 
-Without yielding w is 0, and the contact goes back the way it came.
+Without yielding w is 0, and the contact goes back the way it came. The formulas are the core's,
+`yielding.c`.
 """
 
 from __future__ import annotations
@@ -21,10 +22,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize.elementwise import find_root
-from scipy.special import beta, betainc
 
-from mbma_tables.common.arguments import FloatArray, entries_at, require, rows
+from mbma_tables.common.arguments import (
+    FloatArray,
+    answered,
+    entries_at,
+    require,
+    rows,
+)
 from mbma_tables.common.errors import OutOfRangeError
+from mbma_tables.core import core
 from mbma_tables.surfaces.any_surface import AnySurface
 from mbma_tables.theories import inversion
 from mbma_tables.theories.base import (
@@ -116,11 +123,12 @@ class Spots(NamedTuple):
         self, yielded: FloatArray, area: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """w, a and b."""
-        load = np.log(np.clip(area, *AREAS) / AREA)
-        rest = 1 - yielded
-        steep = self.power + self.power_elastic * rest + self.power_area * load
-        logit = self.exponent + self.exponent_elastic * rest + self.exponent_area * load
-        return yielded**self.weight, 1 + np.exp(steep), 1 / (1 + np.exp(-logit))
+        found = answered(core.flat_spots, (yielded, area), 3, self.numbers())
+        return found[0], found[1], found[2]
+
+    def numbers(self) -> FloatArray:
+        """The constants as the core takes them, `mbma_spots_law` of mbma.h."""
+        return np.array([*self, AREA, *AREAS])
 
 
 AREA = 0.05
@@ -130,28 +138,31 @@ STIFFNESS = Spots(1.127, -0.354, -3.242, -0.159, 1.374, -2.662, 0.163)
 CONTACT = Spots(1.043, 0.328, -1.338, -0.024, 1.440, -2.508, -0.144)
 
 
-def flattened(s: FloatArray, power: Any, exponent: Any) -> FloatArray:
+def flattened(s: ArrayLike, power: ArrayLike, exponent: ArrayLike) -> FloatArray:
     """[1 - (1-s)^a]^b, a stiffness or an area of flattened spots over that at s = 1."""
-    return np.asarray((1 - (1 - s) ** power) ** exponent)
+    return answered(core.flattened, (s, power, exponent))[0]
 
 
-def lift(s: FloatArray, power: Any, exponent: Any) -> FloatArray:
-    """Integral of 1/`flattened` from s to 1."""
-    return _moment(s, power, exponent, 1)
+def stiffness_ratio(s: ArrayLike, elastic: ArrayLike, *spots: ArrayLike) -> FloatArray:
+    """K/K0 by that of the elastic contact, K_e(p)/K_e(p0), and w, a and b."""
+    return answered(core.unloaded_stiffnesses, (s, elastic, *spots))[0]
 
 
-def energy(s: FloatArray, power: Any, exponent: Any) -> FloatArray:
+def area_ratio(s: ArrayLike, elastic: ArrayLike, *spots: ArrayLike) -> FloatArray:
+    """A/A0 by that of the elastic contact, A_e(p)/A_e(p0), and v, c and d."""
+    return answered(core.unloaded_areas, (s, elastic, *spots))[0]
+
+
+def raised(
+    s: ArrayLike, elastic: ArrayLike, depth: ArrayLike, *spots: ArrayLike
+) -> FloatArray:
+    """u - u0 by the elastic [u_e(p) - u_e(p0)] K_e(p0)/K0, the depth p0/K0, and w, a and b."""
+    return answered(core.unloaded_gaps, (s, elastic, depth, *spots))[0]
+
+
+def energy(s: ArrayLike, power: ArrayLike, exponent: ArrayLike) -> FloatArray:
     """Integral of t/`flattened` over t from 0 to s."""
-    parts = [_moment(end, power, exponent, order) for order in (1, 2) for end in (0.0, s)]
-    return np.asarray(parts[0] - parts[1] - parts[2] + parts[3])
-
-
-def _moment(s: ArrayLike, power: Any, exponent: Any, order: int) -> FloatArray:
-    """Integral of (1-t)^(order - 1)/`flattened` over t from s to 1."""
-    first = order / np.asarray(power)
-    last = 1 - np.asarray(exponent)
-    whole = beta(first, last) / power
-    return np.asarray(whole * betainc(first, last, (1 - np.asarray(s)) ** power))
+    return answered(core.flat_integrals, (s, power, exponent), 1, 1)[0]
 
 
 class Peak(NamedTuple):
@@ -191,11 +202,10 @@ class Peak(NamedTuple):
 
     def separation(self, elastic_separation: FloatArray, s: FloatArray) -> FloatArray:
         """Mean separation where that of the elastic contact at the same pressure is known."""
-        weight, *powers = self.spots
         moved = elastic_separation - self.elastic_separation
-        flat = weight * lift(s, *powers) * self.pressure
-        elastic = (1 - weight) * moved * self.elastic.stiffness
-        return np.asarray(self.mean_separation + (elastic + flat) / self.stiffness)
+        elastic = moved * (self.elastic.stiffness / self.stiffness)
+        depth = self.pressure / self.stiffness
+        return np.asarray(self.mean_separation + raised(s, elastic, depth, *self.spots))
 
     def distances(self, last: FloatArray, elastic: Curve) -> Curve:
         """Distance from the branch to last contact at `last`, by the elastic separation, of whose force the curve is."""
@@ -429,17 +439,12 @@ class Unloading(Theory):
         """Contacts of the branch, by mean separations v of the elastic contact at the same forces."""
         elastic = self.branch_theory.answer(surface, v)
         s = np.minimum(elastic.pressure / peak.pressure, 1.0)
-        weight, *powers = peak.spots
-        compliance = (1 - weight) * peak.elastic.stiffness / elastic.stiffness
-        compliance = compliance + weight / flattened(s, *powers)
-        stiffness = np.where(s > 0, peak.stiffness / compliance, 0.0)
-        weight, *powers = peak.area_spots
-        shrunk = (elastic.area / peak.elastic.area) ** (1 - weight)
-        area = peak.area * shrunk * flattened(s, *powers) ** weight
+        steep = elastic.stiffness / peak.elastic.stiffness
+        stiffness = peak.stiffness * stiffness_ratio(s, steep, *peak.spots)
+        share = elastic.area / peak.elastic.area
+        area = peak.area * area_ratio(s, share, *peak.area_spots)
         error = 2 * elastic.error
-        answer = TheoryAnswer(
-            s * peak.pressure, np.where(s > 0, area, 0.0), stiffness, error
-        )
+        answer = TheoryAnswer(s * peak.pressure, area, stiffness, error)
         yielded = np.where(s > 0, peak.yielded, 0.0)
         return YieldedContacts(answer, yielded, stiffness, u - peak.flattening)
 

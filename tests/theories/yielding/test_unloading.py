@@ -2,6 +2,7 @@
 
 import pickle
 
+import mpmath
 import numpy as np
 import pytest
 import xarray as xr
@@ -258,6 +259,32 @@ def test_contacts_unlike_those_simulated_are_not_valid():
     assert not near.valid
     assert "third of the hardness" in "".join(near.reasons)
     assert "after a largest pressure of 0.1 GPa" in repr(valid)
+
+
+def test_integrals_of_flattened_spots_are_incomplete_beta_functions():
+    """In x = (1-t)^a; by mpmath at 60 digits, from the lightest contacts to the largest pressure."""
+    rng = np.random.default_rng(17)
+    ratios = (1e-12, 1e-6, 1e-3, 0.1, 0.3, 0.5, 0.7, 0.99, 1 - 1e-9)
+    s = np.repeat(ratios, 5)
+    a, b = rng.uniform(1.01, 2.2, s.size), rng.uniform(0.05, 0.95, s.size)
+    lift = law.raised(s, 0.0, 1.0, 1.0, a, b)
+    energy = law.energy(s, a, b)
+    flat = law.flattened(s, a, b)
+    with mpmath.workdps(60):
+        for k, given in enumerate(zip(s, a, b, strict=True)):
+            ratio, power, exponent = map(mpmath.mpf, given)
+            x, first = (1 - ratio) ** power, 1 / power
+            rest = 1 - exponent
+
+            def part(end, p, q, over=power):
+                return mpmath.betainc(p, q, 0, end) / over
+
+            work = part(1 - x, rest, first) - part(1 - x, rest, 2 * first)
+            assert lift[k] == pytest.approx(float(part(x, first, rest)), rel=1e-14)
+            assert energy[k] == pytest.approx(float(work), rel=3e-14)
+            assert flat[k] == pytest.approx(float((1 - x) ** exponent), rel=1e-14)
+    assert law.raised(1.0, 0.0, 1.0, 1.0, 1.5, 0.5) == law.energy(0.0, 1.5, 0.5) == 0.0
+    assert np.isnan(law.flattened([np.nan, -0.1, 1.1], 1.5, 0.5)).all()
 
 
 @pytest.mark.slow
