@@ -185,14 +185,23 @@ def test_island_statistics_add_up():
 
 def test_the_certificate_decides_between_table_and_solver(monkeypatch):
     bound = plans.certified_error("universal", 1.0)
-    certificate = open_table("universal").content.attributes
-    assert bound == max(certificate["largest_error_F"], certificate["largest_error_A"])
-    for rtol, island_model in ((2.02 * bound, "universal"), (1.98 * bound, "exact")):
+    assert bound == open_table("universal").content.local_error.max()
+    for rtol, island_model in ((3.02 * bound, "universal"), (2.98 * bound, "exact")):
         assert (
             scene_of("pressure", rtol=rtol).plan().steps[0].island_model == island_model
         )
-    monkeypatch.setitem(certificate, "largest_error_A", 1e-3)
+    monkeypatch.setattr(plans, "certified_error", lambda *_: 1e-3)
     assert scene_of("pressure", rtol=1e-4).plan().steps[0].island_model == "exact"
+
+
+@pytest.mark.parametrize("rtol", [2e-10, 3e-10, 4e-10, 5e-10, 1e-9])
+def test_a_tolerance_near_the_bound_of_the_table_is_reached(rtol):
+    """The plan took the largest error seen for the bound, and such runs were refused."""
+    for name in ("concrete", "challenge", "yang-persson"):
+        surface = Surface.named(name)
+        gaps = np.linspace(0, 0.9, 3) * surface.h_max
+        scene = Scene(surface, 1.0, quantities=["pressure"], separation=gaps, rtol=rtol)
+        assert scene.run().attrs["error"] <= rtol
 
 
 HISTORY = """

@@ -21,6 +21,7 @@ from mbma_tables import (
     contact_law,
     greenwood_tripp,
     island,
+    open_table,
 )
 from mbma_tables.islands.variants import REPORTED, VARIANTS
 from mbma_tables.theories import Mbma
@@ -29,6 +30,9 @@ SHALLOW = dataclasses.replace(REPORTED, name="shallow", beta=0.01, phi=0.001)
 OPEN = dataclasses.replace(
     REPORTED, name="open", floor_d=1.3, floor_u=2.2, density_divisor=11.0
 )
+
+
+BOUND = open_table("universal").content.local_error.max()
 
 
 @functools.cache
@@ -54,24 +58,25 @@ def apart(found, true):
 
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-8, 1e-10])
-def test_universal_within_1e7_and_its_tolerance_of_exact(variant, rtol):
+def test_universal_within_its_tolerance_of_exact(variant, rtol):
     surfaces, gaps, true = solved(variant)
     found = contact(surfaces, separation=gaps, theory=Mbma(variant=variant, rtol=rtol))
     assert found.island_model == "universal"
     error = apart(found, true)
     assert (error <= found.error).all()
-    assert found.error.max() <= rtol + 1e-7
+    # islands, panels and tails, none of which is closer than the table's bound
+    assert found.error.max() <= rtol + 3 * BOUND
     assert true.error.max() <= 1e-10
 
 
-def test_island4d_within_1e3_of_exact():
+def test_island4d_within_its_bound_of_exact():
     surfaces, gaps, true = solved("reported")
     found = contact(
         surfaces, separation=gaps, theory=Mbma(island_model="island4d", rtol=1e-6)
     )
     assert found.island_model == "island4d"
     assert (apart(found, true) <= found.error).all()
-    assert found.error.max() <= 1e-3
+    assert found.error.max() <= 1e-6 + 3e-5
     # a coarser table than the other
     assert np.median(apart(found, true)) > 1e-8
 

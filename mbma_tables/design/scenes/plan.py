@@ -29,6 +29,8 @@ from mbma_tables.theories import resolve
 
 LEAKAGE = "leakage"  # of `Contact.leakage`: several quantities under one name
 ISLAND_SHARE = 0.5  # share of a step's tolerance; the rest is for its quadrature
+# of a table's islands, of panels no closer than these, and of both ends: in a sum's error
+ISLAND_BOUNDS = 3
 AMPLIFICATION = {
     # gaps that follow from pressures add their error to that of the values
     "inverse": 2.0,
@@ -225,8 +227,7 @@ def certified_error(island_model: str | AnyModel, rtol: float) -> float:
 
         island_model = open_islands(island_model)
     if isinstance(island_model, UniversalModel | Island4dModel):
-        certificate = island_model.content.attributes
-        return max(float(certificate[f"largest_error_{of}"]) for of in "FA")
+        return float(np.max(island_model.content.local_error))
     # the solver works to a tenth of the requested tolerance
     known = {"exact": 0.1 * rtol, "rigid": 0.0}
     return (
@@ -306,8 +307,8 @@ class _Planner:
             return given
         if "sphere_deformation" in self.scene.without:
             return "rigid"
-        share = ISLAND_SHARE * tolerance
-        return "universal" if certified_error("universal", share) <= share else "exact"
+        bound = certified_error("universal", tolerance)
+        return "universal" if ISLAND_BOUNDS * bound <= tolerance else "exact"
 
     @property
     def parts(self) -> set[str]:
