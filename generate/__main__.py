@@ -47,7 +47,6 @@ PARTS = {
     "architecture": ("docs/architecture.md", "pages.library:architecture"),
     "formula": ("docs/model.md", "pages.library:formula"),
     "readme": ("README.md", "pages.library:readme"),
-    "tables": ("docs/tables.md", "pages.library:tables"),
     "theories": ("docs/theories.md", "pages.library:theories"),
     "surfaces": ("docs/surfaces.md", "pages.surfaces:sensitivities"),
     "howto/cutoff": ("docs/howto/cutoff.md", "pages.surfaces:cutoff"),
@@ -70,6 +69,8 @@ PARTS = {
     "rough_bodies": ("docs/joints.md", "pages.simulations:rough_bodies"),
     "cost": ("docs/lookup.md", "pages.cost:measure"),
     "guarantees": ("docs/guarantees.md", "pages.stability:measure"),
+    # quotes the page of guarantees
+    "tables": ("docs/tables.md", "pages.library:tables"),
     "explorer": ("docs/export.md", "explorer:measure"),
     "yield": ("docs/yield.md", "pages.laws:yielding"),
     "unloading": ("docs/yield.md", "pages.unloading:measure"),

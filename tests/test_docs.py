@@ -290,7 +290,7 @@ def test_the_index_begins_with_the_commands_of_the_readme():
 
 
 def test_readme_shows_results():
-    assert [bool(shown) for *_, shown in BLOCKS["README.md"]] == [True] * 4
+    assert [bool(shown) for *_, shown in BLOCKS["README.md"]] == [True] * 5
 
 
 def test_measured_parts_of_the_readme_are_the_generators():

@@ -29,7 +29,7 @@ from mbma_tables.tables.open import shipped
 from mbma_tables.tables.picture import draw_errors
 from mbma_tables.tables.reader import read_table
 from mbma_tables.tables.schema import ISLAND4D, KINDS, UNIVERSAL, TableContent
-from mbma_tables.theories import THEORIES
+from mbma_tables.theories import THEORIES, Mbma
 from mbma_tables.theories.mbma.closed_form_certificates import CERTIFICATES, RANGES
 from mbma_tables.theories.mbma.closed_forms import FUNCTIONS, ClosedForm
 
@@ -132,7 +132,11 @@ def architecture() -> Measured:
 def tables() -> Measured:
     contents = {kind: read_table(shipped(kind), kind) for kind in KINDS}
     figure = draw_errors(contents[UNIVERSAL])
-    parts = {"sizes": _sizes(contents), "axes": _axes(contents[ISLAND4D])}
+    parts = {
+        "sizes": _sizes(contents),
+        "accuracy": _accuracy(contents),
+        "axes": _axes(contents[ISLAND4D]),
+    }
     return parts, {"docs/figures/tables_universal_error.svg": figure}
 
 
@@ -142,17 +146,81 @@ def _sizes(contents: dict[str, TableContent]) -> str:
     for (kind, content), quantity in itertools.product(contents.items(), "FA"):
         megabytes = shipped(kind).stat().st_size / 1e6
         errors = [
-            content.attributes[f"largest_error_{quantity}"],
-            content.attributes[f"p99_error_{quantity}"],
             content.attributes[f"median_error_{quantity}"],
+            content.attributes[f"p99_error_{quantity}"],
             content.attributes[f"visited_largest_error_{quantity}"],
         ]
         rows.append([kind, content.size, megabytes, quantity, *errors])
     header = (
-        "table | cells or nodes | file | of | largest error | 99% below | half below"
-        " | largest at islands"
+        "table | cells or nodes | file | errors of | half below | 99% below"
+        " | largest at islands of surfaces"
     )
     return table(header, rows, "{} | {} | {:.2f} MB | {} | {:.1e}")
+
+
+def _cell_of(page: str, row: str, column: int) -> str:
+    """A number that another program wrote into a table of a page, by the first cell of its row."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    found: list[str] = re.findall(rf"^\| {re.escape(row)} \|.*$", text, re.MULTILINE)
+    (line,) = found
+    return line.split("|")[column + 1].strip()
+
+
+def _accuracy(contents: dict[str, TableContent]) -> str:
+    """Bounds and largest errors of lookups and of contacts, each with its comparison and command."""
+    lookups = {
+        UNIVERSAL: "Phi_F and Phi_A of an island",
+        ISLAND4D: "F_hat and A_hat of an island",
+    }
+    corners = "`python -m generate pages guarantees`"
+    million = "1,000,000"
+    rows: list[list[Cell]] = []
+    for kind, quantity in lookups.items():
+        content = contents[kind]
+        bound = f"{np.max(content.local_error):.2e}"
+        seen = max(content.attributes[f"largest_error_{of}"] for of in "FA")
+        solved = f"the solver on twice the nodes, at {content.attributes['certificate_points']:,} points"
+        rows.append(
+            [quantity, kind, solved, bound, f"{seen:.1e}", f"`mbma tables show {kind}`"]
+        )
+        if kind == UNIVERSAL:
+            of_corner = _cell_of("guarantees.md", f"islands by {kind}", 5)
+            extreme = "40 digits, or the solver at 1e-11, at extreme islands"
+            rows.append([quantity, kind, extreme, bound, of_corner, corners])
+        else:
+            of_many = _cell_of("tables.md", million, 1)
+            others = f"lookups in `{UNIVERSAL}`, at {million} islands"
+            rows.append(
+                [
+                    quantity,
+                    kind,
+                    others,
+                    bound,
+                    of_many,
+                    "`python -m benchmarks surrogates`",
+                ]
+            )
+    rtol = Mbma().rtol
+    for kind in lookups:
+        stated = f"{rtol:.0e}, the default `rtol`" if kind == UNIVERSAL else "its `error`"
+        of_corner = _cell_of("guarantees.md", f"totals by {kind}", 5)
+        exact = "the same sums of exact islands at 1e-10, for extreme surfaces and gaps"
+        rows.append(
+            ["pressure and area of a surface", kind, exact, stated, of_corner, corners]
+        )
+    share = _cell_of("guarantees.md", "`error` of MBMA, against exact islands", 4)
+    rows.append(
+        [
+            "pressure and area of a surface",
+            UNIVERSAL,
+            "the same sums of exact islands, for random surfaces, gaps and `rtol`",
+            "its `error`",
+            f"{share} of its `error`",
+            "`python -m generate audit`",
+        ]
+    )
+    header = "quantity | table | compared with | bound | largest error seen | command"
+    return table(header, rows)
 
 
 def _axes(content: TableContent) -> str:
