@@ -61,7 +61,7 @@ PARTS = {
     "maps": ("docs/maps.md", "pages.maps:maps"),
     "measured": ("docs/fidelity.md", "pages.measurements:measurements"),
     "metals": ("docs/yield.md", "pages.measurements:metals"),
-    "data": ("docs/data.md", "pages.simulations:data"),
+    "data": ("docs/data/README.md", "pages.simulations:data"),
     "fidelity": ("docs/fidelity.md", "pages.simulations:fidelity"),
     "joints": ("docs/joints.md", "pages.simulations:joints"),
     "tutorials/design": ("docs/tutorials/design.md", "pages.simulations:design"),

@@ -52,7 +52,7 @@ FILES = {
     "adhesive_held_out.csv": ("contacts with an attraction, by another program", ""),
     "unloading_other.csv": ("loading and unloading, by another program", ""),
 }
-BESIDE = ("CITATION.cff", "LICENSE", "docs/data.md")
+BESIDE = ("CITATION.cff", "LICENSE", "docs/data/README.md")
 DAY = (1980, 1, 1, 0, 0, 0)  # of every member, so that equal files give equal archives
 TITLE = "Boundary-element simulations of the contact of rough surfaces"
 

@@ -353,6 +353,6 @@ def score(path: pathlib.Path) -> None:
     """Print how far the theories of the Python file PATH are from boundary elements.
 
     Root mean squares of ln(theory/simulation) in percent, at 1-10% / 10-97% contact, on the
-    surfaces of which none was used in a fit; docs/data.md describes PATH.
+    surfaces of which none was used in a fit; docs/data/README.md describes PATH.
     """
     click.echo(scores(theories_of(path)))

@@ -1,6 +1,6 @@
 """A valid answer of each kind of input lies within its stated model uncertainty of simulations of that kind.
 
-The simulations are the boundary elements of docs/data.md that no fit saw. Each kind has its
+The simulations are the boundary elements of docs/data/README.md that no fit saw. Each kind has its
 own share of errors within two standard deviations; the least is that of docs/fidelity.md,
 docs/yield.md, docs/leakage.md, docs/fidelity.md and docs/maps.md.
 """

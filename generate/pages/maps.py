@@ -349,7 +349,7 @@ def artefacts_by_group() -> str:
     rows: list[list[Cell]] = [
         [str(group), *map(int, row)] for group, row in sums.iterrows()
     ]
-    header = "artefact | maps | told | area wrong | wrong and not told"
+    header = "artefact | maps | not valid | area wrong | wrong and no warning"
     return table(header, rows, "{} | {:d}")
 
 

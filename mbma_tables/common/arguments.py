@@ -119,7 +119,7 @@ OF_DRAWINGS = {
 }
 OF_ROUGHNESS = dict.fromkeys(
     ("Rq", "Ra", "Sq", "Sa", "Rdq", "Sdq", "Rsm", "longest", "shortest", *OF_DRAWINGS),
-    "Surface.from_roughness takes roughness parameters (docs/howto/roughness.md)",
+    "Surface.from_roughness takes roughness parameters (docs/surfaces.md)",
 )
 # hints for names that are no arguments, of functions that have one of the first ones
 ELSEWHERE = (

@@ -91,7 +91,7 @@ FILTERS = (
     "the cut-off lambda_c is longest, the filter lambda_s or the resolution shortest"
 )
 # where each number comes from
-PAGE = "docs/howto/roughness.md, 'From Ra and a filter to a surface', says where to find each"
+PAGE = "docs/surfaces.md, 'From Ra and a filter to a surface', says where to find each"
 
 
 def _one_of(names: tuple[str, ...], numbers: Mapping[str, Any], what: str) -> str:

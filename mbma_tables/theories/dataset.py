@@ -32,7 +32,7 @@ def read_groups(path: pathlib.Path) -> dict[str, Any]:
 
 
 def boundary_elements(path: os.PathLike[str] | str | None = None) -> xr.DataTree:
-    """The data set of BEM simulations, one group for each campaign, as described in docs/data.md.
+    """The data set of BEM simulations, one group for each campaign, as described in docs/data/README.md.
 
     Parameters
     ----------

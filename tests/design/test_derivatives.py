@@ -286,7 +286,7 @@ def test_where_contact_begins():
 
 @pytest.mark.slow
 def test_random_quantities_by_random_numbers():
-    """`python -m benchmarks.derivative_errors` has 500 of them, in docs/derivatives.md."""
+    """`python -m benchmarks.derivative_errors` has 500 of them, in docs/lookup.md."""
     from benchmarks.derivative_errors import outcomes
 
     made = outcomes(60, seed=7)

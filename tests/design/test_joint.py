@@ -441,7 +441,7 @@ def test_effects_that_are_not_called_for_cost_nothing(joint, monkeypatch):
         (
             {"part_b": {"Ra": "1.6 um"}},
             r"part_b: roughness has Ra, .*missing: hurst.*two of longest, shortest"
-            r".*lambda_c is longest.*docs/howto/roughness.md, 'From Ra and a filter",
+            r".*lambda_c is longest.*docs/surfaces.md, 'From Ra and a filter",
         ),
         (
             {"nominal_area": None},
