@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import click
 import numpy as np
+from numpy.typing import NDArray
 from tqdm import tqdm
 
 from generate.files import dataset
@@ -17,11 +18,15 @@ from generate.machined.makers import Part
 from mbma_tables import Surface, contact, uncertainty
 from mbma_tables.common.arguments import FloatArray
 from mbma_tables.common.files import write_file
+from mbma_tables.contacts.result import Contact
 from mbma_tables.surfaces.roughness import processes
 
 FILE = pathlib.Path("tables/processes.csv")
 SPREADS = {"area": "area", "gap": "mean_separation", "stiffness": "stiffness"}
 RANGE = (0.01, 0.6)  # A/A0 of the contacts that count
+FLOW = "flow"  # the kind of spread of both axes' flow coefficients
+FLOW_AREA = 0.2  # A/A0 up to which they count, where neither is blocked
+KINDS = (*SPREADS, FLOW)
 HURST = 0.85  # the middle of what engineering surfaces have
 TOP = 4.5  # h_max/h_rms
 # Ra [um] to which maps are enlarged, in both directions alike
@@ -29,6 +34,7 @@ HEIGHTS = (0.4, 0.8, 1.6, 3.2, 6.3)
 # spread of a process without maps over the largest of those with maps
 BEYOND = 1.1
 BAND = (0.025, 0.5, 0.975)
+NORMAL_95 = 1.96  # standard deviations
 DRAWS = 400
 
 
@@ -42,6 +48,7 @@ class Reduced(NamedTuple):
     pressure: FloatArray
     simulated: dict[str, FloatArray]  # by quantity
     counts: Any  # mask of the loads
+    flow: FloatArray  # of both axes, 0 where blocked, NaN where it does not count
 
 
 def reduced(chosen: list[Part] | None = None) -> Iterator[Reduced]:
@@ -59,6 +66,7 @@ def reduced(chosen: list[Part] | None = None) -> Iterator[Reduced]:
             if name in one
         }
         area = simulated["area"]
+        flow = np.stack([one.flow_x.values, one.flow_y.values]).astype(float)
         yield Reduced(
             part.family,
             float(np.mean(np.abs(values - values.mean()))),
@@ -67,11 +75,12 @@ def reduced(chosen: list[Part] | None = None) -> Iterator[Reduced]:
             one.pressure.values.astype(float),
             simulated,
             (area >= RANGE[0]) & (area <= RANGE[1]),
+            np.where(area <= FLOW_AREA, flow, np.nan),
         )
 
 
-def errors(one: Reduced) -> dict[str, FloatArray]:
-    """ln of the law's answers, from Ra and the ends of the band, over the simulation's at equal pressure."""
+def told(one: Reduced) -> Contact:
+    """The law's answers from Ra and the ends of the band."""
     face = Surface.from_roughness(
         Ra=one.Ra,
         hurst=HURST,
@@ -79,11 +88,37 @@ def errors(one: Reduced) -> dict[str, FloatArray]:
         shortest=one.shortest,
         h_max=TOP * one.Ra * np.sqrt(np.pi / 2),
     )
-    pressed = contact(face, pressure=one.pressure, theory="calibrated")
-    return {
+    return contact(face, pressure=one.pressure, theory="calibrated")
+
+
+def errors_of_flow(one: Reduced) -> FloatArray:
+    """ln of the law's flow over the simulation's along both axes, infinite where that is blocked."""
+    with np.errstate(divide="ignore"):
+        found = np.log(told(one).leakage.K / one.flow)
+    return np.asarray(found[~np.isnan(one.flow)])
+
+
+def errors(one: Reduced) -> dict[str, FloatArray]:
+    """ln of the law's answers over the simulation's at equal pressure, of flow where neither is blocked."""
+    pressed = told(one)
+    found = {
         kind: np.log(pressed.quantity(name) / one.simulated[name])[one.counts]
         for kind, name in SPREADS.items()
     }
+    of_flow = errors_of_flow(one)
+    found[FLOW] = of_flow[np.isfinite(of_flow)]
+    return found
+
+
+def flows_in_bands(maps: list[Reduced]) -> NDArray[np.bool_]:
+    """Whether flows are in the 95% band by the spread of the half of the maps that they are not of."""
+    inside = []
+    for half in (0, 1):
+        found = spreads(maps[1 - half :: 2])
+        for one in maps[half::2]:
+            spread = found.get(one.family, found[""])[FLOW]
+            inside.append(np.abs(errors_of_flow(one)) < NORMAL_95 * spread)
+    return np.concatenate(inside)
 
 
 def spreads(maps: list[Reduced]) -> dict[str, dict[str, float]]:
@@ -95,9 +130,9 @@ def spreads(maps: list[Reduced]) -> dict[str, dict[str, float]]:
             kind: float(
                 np.sqrt(np.mean(np.concatenate([each[kind] for each in own]) ** 2))
             )
-            for kind in SPREADS
+            for kind in KINDS
         }
-    largest = {kind: max(own[kind] for own in found.values()) for kind in SPREADS}
+    largest = {kind: max(own[kind] for own in found.values()) for kind in KINDS}
     found[""] = {kind: BEYOND * spread for kind, spread in largest.items()}
     return found
 
@@ -131,7 +166,7 @@ def with_spreads(text: str, found: dict[str, dict[str, float]]) -> str:
     rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
     for row in rows:
         own = found.get(row["process"], found[""])
-        row |= {f"{kind}_spread": f"{own[kind]:.3f}" for kind in SPREADS}
+        row |= {f"{kind}_spread": f"{own[kind]:.3f}" for kind in KINDS}
     body = io.StringIO()
     writer = csv.DictWriter(body, rows[0].keys(), lineterminator="\n")
     writer.writeheader()
@@ -146,7 +181,7 @@ def with_other_spreads(found: dict[str, dict[str, float]]) -> Iterator[None]:
     shipped = {name: dict(row) for name, row in rows.items()}
     for name, row in rows.items():
         own = found.get(name, found[""])
-        row |= {f"{kind}_spread": f"{own[kind]:.3f}" for kind in SPREADS}
+        row |= {f"{kind}_spread": f"{own[kind]:.3f}" for kind in KINDS}
     try:
         yield
     finally:
@@ -176,12 +211,15 @@ def drawing(write: bool, held_out: bool) -> None:
     """Compare simulated machined maps with what Ra and the process tell: five minutes.
 
     Prints a table of the shares of their contacts in the 95% band of Ra and process: of
-    area, gap and stiffness, by Ra and process.
+    area, gap and stiffness, by Ra and process; before it that of flows, by the spread alone
+    of the half of the maps that they are not of.
     """
     maps = list(reduced())
     if write:
         text = with_spreads(FILE.read_text(encoding="utf-8"), spreads(maps))
         write_file(FILE, text.encode())
+    flows = flows_in_bands(maps)
+    click.echo(f"{flows.size} flows, in the band {flows.mean():.1%}")
     families = np.array([one.family for one in maps])
     click.echo(f"| process (maps) | {' | '.join(f'{Ra:g} um' for Ra in HEIGHTS)} |")
     click.echo(f"| --- | {' | '.join('---' for _ in HEIGHTS)} |")

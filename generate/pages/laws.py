@@ -349,11 +349,12 @@ def draw_gas_leak() -> Figure:
     """Leak of two gases against the pressure of the seal of docs/leakage.md."""
     found = contact(SEAL, "20 MPa", pressure=SEAL_PRESSURES, theory="calibrated")
     leak = found.leakage
-    factor = np.exp(leak.scatter)
     figure, axes = panels(size=(6.0, 4.0))
     for number, gas in enumerate(("helium", "air")):
         # where it is blocked there is no rate, and no logarithm of it
-        rate = np.where(leak.blocked, np.nan, leak.gas(gas, **RING, unit=LEAK_UNIT))
+        ring = {"gas": gas, **RING, "unit": LEAK_UNIT}
+        rate = np.where(leak.blocked, np.nan, leak.gas(**ring))
+        factor = np.exp(leak.scatter_of_rate(ring))
         colour = f"C{number}"
         axes.plot(SEAL_PRESSURES, rate, ":", color=colour)
         of_valid = np.where(leak.valid, rate, np.nan)

@@ -398,6 +398,26 @@ class Pair:
         return _mean_conductivity(first), _mean_conductivity(second)
 
     @property
+    def remedy(self) -> str:
+        """How to give the hardness of the softer one."""
+        soft, hard = self.softer.hardness
+        if soft == hard:
+            return f"Bodies(metals=..., hardness='{soft:g} GPa')"
+        remedy = f"Bodies(metals=..., hardness=...), '{soft:g} GPa' to '{hard:g} GPa'"
+        if not is_name(f"{self.softer.name} hard"):
+            return remedy
+        tempers = f"'{self.softer.name} soft' or '{self.softer.name} hard'"
+        return f"its temper, {tempers}, or {remedy}"
+
+    @property
+    def without_hardness(self) -> str:
+        """What is stated in place of a hardness where the metals have none."""
+        return (
+            f"not known, so that contacts are elastic: of {self.softer.name} give "
+            f"{self.remedy}"
+        )
+
+    @property
     def ranges_of_conductivity(self) -> str:
         """The ranges in the literature of which `conductivities` are the means, as text."""
         ranges = [metal.conductivity for metal in self.metals]

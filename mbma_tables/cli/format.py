@@ -7,7 +7,7 @@ import dataclasses
 import functools
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -177,7 +177,7 @@ def columns_of(
     for name in shown_names:
         values[name] = pressed.quantity(name)
         units[name] = column_unit(registry.get(name).unit(pressed))
-    values["valid"] = np.where(pressed.valid, "yes", "no")
+    values["valid"] = np.where(pressed.judged(shown_names).valid, "yes", "no")
     units["error"] = "relative"
     return values, units
 
@@ -221,11 +221,14 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
     return facts, notes
 
 
-def validity_of(answer: Contact) -> tuple[list[str], dict[str, Any]]:
-    """Where contacts are not valid and why, and how they are loaded: lines of text, and machine-readable facts."""
-    valid = np.atleast_1d(answer.valid)
+def validity_of(
+    answer: Contact, names: Iterable[str]
+) -> tuple[list[str], dict[str, Any]]:
+    """Where quantities of contacts are not valid and why, and how they are loaded: lines of text, and machine-readable facts."""
+    judged = answer.judged(names)
+    valid = np.atleast_1d(judged.valid)
     reasons = {
-        reason: np.flatnonzero(mask).tolist() for reason, mask in answer.reasons.items()
+        reason: np.flatnonzero(mask).tolist() for reason, mask in judged.reasons.items()
     }
     notes = []
     if reasons:
@@ -364,7 +367,9 @@ def report_answer(
             notes[-1] = (
                 f"hardness {model.hardness}: psi {answer.psi:.3g}, elastic up to {ELASTIC_PSI:g} (from {limit} on)"
             )
-        for lines, more in (validity_of(answer), _scatter(answer)):
+        # columns of leakage have a validity of their own
+        names = () if "leakage_valid" in values else values
+        for lines, more in (validity_of(answer, names), _scatter(answer)):
             notes = notes + lines
             facts = facts | more
     own = {name: shown_unit(name, specimen.units) for name in values if name not in units}

@@ -386,7 +386,7 @@ def joint_command(
     assumed = assumptions(joint.surface)
     notes = [f"{name}: {text}" for name, text in facts.items() if name != "assumed"]
     notes += assumption_notes(assumed)
-    lines, validity = validity_of(found)
+    lines, validity = validity_of(found, values)
     notes += lines
     Report(
         "joint",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -65,7 +65,11 @@ OF_FALLING = (
     "largest_pressure is"
 )
 # labels of panels whose quantities do not end in it
-PANELS = {"area": "real contact area  A/A0", "mean_separation": "mean gap"}
+PANELS = {
+    "area": "real contact area  A/A0",
+    "mean_separation": "mean gap",
+    "leak_rate": "leak rate",
+}
 CURVES = ("mean_separation", "pressure", "area")
 
 
@@ -251,6 +255,12 @@ class Contact(State, Displayed):
         if name not in self._missing:
             self._missing[name] = registry.get(name).missing(self)
         return self._missing[name]
+
+    def judged(self, names: Iterable[str]) -> Contact | Leakage:
+        """What has the `valid` and the `reasons` of quantities: the leakage where one of them follows from the flow."""
+        known = [name for name in names if name in registry.registry()]
+        parts = set[str]().union(*map(registry.names_of_parts, known))
+        return self.leakage if "flow_coefficient" in parts else self
 
     def available(self) -> list[str]:
         """Names of the quantities for which everything needed was given."""
@@ -533,6 +543,9 @@ class Contact(State, Displayed):
             facts["if"] = "; ".join(assumptions(self.surface))
         for name in ("mean_separation", "pressure", "area"):
             facts[name] = self._shown(name)
+        pair = self.bodies.pair
+        if pair is not None and not self.bodies.hardness_is_given:
+            facts["hardness"] = pair.without_hardness
         if (
             any_labelled(self.surface, self.mean_separation)
             or np.size(self.error) > MOST_SHOWN

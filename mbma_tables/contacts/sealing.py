@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from mbma_tables.common.arguments import require
 from mbma_tables.common.errors import InputError, OutOfRangeError
 from mbma_tables.contacts.law.law import ContactLaw
-from mbma_tables.contacts.quantities.gas_flow import RATE_UNITS, gas_scatter
+from mbma_tables.contacts.quantities.gas_flow import RATE_UNITS
 
 LIGHTEST = 1e-5  # A/A0 of the lightest contact that is tried
 FULLEST = 0.65  # and of the fullest: contact blocks flow before
@@ -78,21 +78,32 @@ def sealing_pressure(
     >>> seal = {"inlet": "2 bar", "outlet": "1 bar", "width": "2 mm", "length": "0.2 m"}
     >>> found = sealing_pressure(law, "1 mg/h", gas="nitrogen", **seal)
     >>> f"{found.pressure:.2f} MPa, {found.low:.2f} to {found.high:.2f}"
-    '0.24 MPa, 0.22 to 0.28'
+    '0.24 MPa, 0.23 to 0.26'
     """
     wanted, unit = _rate(rate)
-    seal = (gas, inlet, outlet, width, length, temperature, unit)
+    seal = {
+        "gas": gas,
+        "inlet": inlet,
+        "outlet": outlet,
+        "width": width,
+        "length": length,
+        "temperature": temperature,
+        "unit": unit,
+    }
     deepest = law.lowest if law.area_turning_point is None else law.area_turning_point
     fullest = min(FULLEST, float(law.area(separation=deepest)))
     interval = math.log(LIGHTEST), math.log(fullest)
 
     def ln_rate(log_area: float, deviations: float) -> float:
         leak = law.at(area=math.exp(log_area)).leakage
-        found = float(leak.gas(*seal))
+        found = float(leak.through(seal))
         if not found > 0:
             return BLOCKED
-        spread = deviations * _scatter(leak) if deviations else 0.0
-        return math.log(found / wanted) + spread
+        error = 0.0
+        if deviations:
+            of_flow = deviations * leak.scatter
+            error = float(leak.error_of_rate(seal, of_flow, deviations))
+        return math.log(found / wanted) + error
 
     lightest, heaviest = (ln_rate(end, 0.0) for end in interval)
     if lightest < 0:
@@ -122,18 +133,13 @@ def sealing_pressure(
             f"rate = {rate!r}: from {area:.4g} of the area on the contact yields and its flow is "
             "not known; it leaks more before"
         )
-    scatter = _scatter(leak)
+    scatter = float(leak.scatter_of_rate(seal))
     ends = [math.nan if math.isnan(scatter) else sealed(sign) for sign in (-1.0, 1.0)]
     pressure, low, high = (
         math.nan if math.isnan(one) else float(law.at(area=one).pressure)
         for one in (area, *ends)
     )
     return SealingPressure(pressure, low, high, area, scatter, bool(leak.valid))
-
-
-def _scatter(leak: Any) -> float:
-    """Standard deviation of ln of a gas's leak rate; NaN where it is not known."""
-    return math.hypot(float(leak.scatter), float(gas_scatter(leak._contact.area)))
 
 
 def _rate(rate: str) -> tuple[float, str]:

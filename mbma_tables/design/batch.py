@@ -37,6 +37,7 @@ from mbma_tables.common.units import (
 from mbma_tables.common.workers import crew
 from mbma_tables.contacts.quantities import registry
 from mbma_tables.contacts.quantities.interface import Gas
+from mbma_tables.contacts.quantities.leakage import SEAL, Leakage, stress_of
 from mbma_tables.contacts.result import Contact
 from mbma_tables.design.joint import FACES, PLAIN_STRESS, Joint
 from mbma_tables.design.row_files import (
@@ -53,12 +54,19 @@ from mbma_tables.design.uncertainty import MOST_DRAWS, Uncertainty, uncertainty_
 from mbma_tables.surfaces.surface import Surface
 
 # arguments whose cells are no numbers
-NAMES = ("bodies", "metals", "gas", "name", "theory", "direction", "process")
+NAMES = ("bodies", "metals", "gas", "name", "theory", "direction", "process", "unit")
 REASON = "reason"
 VALID = "valid"
 ENDS = ("_low", "_high")  # of the columns of quantiles
 # units of arguments that are neither lengths nor stresses
-OTHER_UNITS = {"force": "N", "conductivity": "W/(m K)", "temperature": "K"}
+OTHER_UNITS = {
+    "force": "N",
+    "conductivity": "W/(m K)",
+    "temperature": "K",
+    "viscosity": "Pa s",
+}
+# whose plain numbers are in pascals
+IN_PASCALS = ("gas.pressure", "seal.inlet", "seal.outlet")
 MOST_WORKERS = 256
 # of a row in which something is missing
 EMPTY = "{name} is empty"
@@ -79,6 +87,8 @@ def known_columns() -> list[str]:
     names += [f"bodies.{each.name}" for each in dataclasses.fields(Bodies)]
     names += [f"bodies.{name}" for name in _arguments(Metal) if name not in vars(Bodies)]
     names += [f"gas.{each.name}" for each in dataclasses.fields(Gas)]
+    of_seal = [*_arguments(Leakage.liquid), *_arguments(Leakage.gas)]
+    names += [f"seal.{name}" for name in of_seal]
     return [*dict.fromkeys(names), *_arguments(Joint.at), "force"]
 
 
@@ -137,7 +147,10 @@ class Column:
             return 1.0
         if self.argument == "temperature" and self.unit == "K":
             return 1.0
-        if self.name == "gas.pressure":
+        if self.argument == "viscosity":
+            # in the unit of stress that results have, times seconds
+            return float(units.number("viscosity", stress_of(f"1 {self.unit}")))
+        if self.name in IN_PASCALS:
             units = Units(stress="Pa")
         return float(units.number(self.argument, f"1 {self.unit}"))
 
@@ -232,7 +245,7 @@ class Column:
             )
         if self.argument in OTHER_UNITS:
             raise InputError(f"{self.name} = {cell!r}: write the unit in the header")
-        if self.name == "gas.pressure":
+        if self.name in IN_PASCALS:
             units = Units(stress="Pa")
         return float(units.number(self.argument, cell))
 
@@ -267,7 +280,7 @@ class Designs:
     def joint(self, numbers: Mapping[str, Any]) -> tuple[Joint, dict[str, Any]]:
         """The joint of some rows, whose columns are arrays or one number each, and its load."""
         entries = dict(self.common)
-        for name in (*FACES, "bodies", "gas"):
+        for name in (*FACES, "bodies", "gas", "seal"):
             if isinstance(entries.get(name), Mapping):
                 entries[name] = dict(entries[name])
         for column in self.columns:
@@ -358,10 +371,11 @@ class Answers:
                     f"{name} is in {unit}, and in {self.units[name]} in rows before"
                 )
             column[rows] = pressed.quantity(name)
-        valid = np.broadcast_to(pressed.valid, rows.shape)
+        judged = pressed.judged(self.values)
+        valid = np.broadcast_to(judged.valid, rows.shape)
         for row, is_valid in zip(rows.tolist(), valid.tolist(), strict=True):
             self.valid[row] = "yes" if is_valid else "no"
-        for reason, mask in pressed.reasons.items():
+        for reason, mask in judged.reasons.items():
             for row in rows[np.broadcast_to(mask, rows.shape)].tolist():
                 earlier = self.reasons[row]
                 self.reasons[row] = f"{earlier}; {reason}" if earlier else reason
@@ -542,23 +556,32 @@ def designs_of(
     return designs
 
 
-def names_of_results(load: str, quantities: Sequence[str] | None) -> list[str]:
+def asked_by_default(designs: Designs) -> list[str]:
+    """Quantities that sensitivities have; the leak rate where rows have a seal."""
+    given = [*designs.common, *(column.name for column in designs.columns)]
+    has_seal = any(name.partition(".")[0] == SEAL.name for name in given)
+    return [
+        name
+        for name in registry.results()
+        if has_seal or SEAL not in registry.needs_of(name)
+    ]
+
+
+def names_of_results(load: str, quantities: Sequence[str]) -> list[str]:
     """Quantities of the answers and their model uncertainties: those asked for, or those that sensitivities have."""
-    asked = registry.results() if quantities is None else list(quantities)
-    names = [name for name in dict.fromkeys(asked) if name != load]
+    names = [name for name in dict.fromkeys(quantities) if name != load]
     stated = [registry.get(name).uncertainty for name in names]
     names += [name for name in stated if name is not None]
     return [name for name in dict.fromkeys(names) if name != VALID]
 
 
-def names_of_medians(load: str, quantities: Sequence[str] | None) -> list[str]:
+def names_of_medians(load: str, quantities: Sequence[str]) -> list[str]:
     """Quantities of which rows have medians and quantiles: those asked for, or those with a model uncertainty."""
     if load not in ("pressure", "force"):
         raise InputError(f"draws are of joints at a pressure or a force, got {load}")
-    asked = registry.results() if quantities is None else list(quantities)
-    for name in asked:
+    for name in quantities:
         registry.get(name)
-    return [name for name in dict.fromkeys(asked) if name not in (load, "pressure")]
+    return [name for name in dict.fromkeys(quantities) if name not in (load, "pressure")]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -648,11 +671,12 @@ def batch(
     with opened(pathlib.Path(designs)) as source, shown("rows"):
         table = designs_of(source, common or {}, keep, pathlib.Path(path))
         load = table.require_load()
+        asked = asked_by_default(table) if quantities is None else list(quantities)
         if draws is None:
-            names = names_of_results(load, quantities)
+            names = names_of_results(load, asked)
         else:
             whole_number_in("draws", draws, 100, MOST_DRAWS)
-            names = names_of_medians(load, quantities)
+            names = names_of_medians(load, asked)
             drawn = Draws(draws, seed, quantities)
             table = dataclasses.replace(table, draws=drawn)
         clashes = [name for name in source.units if name in (*names, VALID, REASON)]

@@ -54,6 +54,7 @@ from mbma_tables.contacts.law.law import ContactLaw
 from mbma_tables.contacts.law.make import law_of
 from mbma_tables.contacts.quantities import registry
 from mbma_tables.contacts.quantities.interface import Gas, Interface
+from mbma_tables.contacts.quantities.leakage import checked_seal
 from mbma_tables.contacts.quantities.properties import JointQuantities
 from mbma_tables.contacts.quantities.tangential import (
     checked_direction,
@@ -153,6 +154,10 @@ class Joint(JointQuantities, Displayed):
         Of the shear relative to the lay, for parts that have one.
     gas : {"air", "helium", "nitrogen", "argon", "vacuum"} or Gas
         In the gaps, at 300 K and 1 atm, or ``Gas("helium", temperature=400)``.
+    seal : mapping, optional
+        For `leak_rate`, the arguments of `Leakage.gas` or of `Leakage.liquid` by name:
+        {"gas": "helium", "inlet": "2 bar", "outlet": "1 bar", "width": "2 mm"}, or
+        {"viscosity": "0.1 Pa s", "pressure_drop": "0.5 MPa", "width": "2 mm"}.
     theory : str or Theory, optional
         As for `contact`.
 
@@ -164,7 +169,7 @@ class Joint(JointQuantities, Displayed):
         The metals, where they are named.
     inputs : dict
         Numbers that are not known, by place such as "part_a.Ra". Numbers of the parts (not
-        of maps), `nominal_area`, `friction`, constants of `bodies` and those of the gas may be ranges,
+        of maps), `nominal_area`, `friction`, constants of `bodies` and those of the gas and the seal may be ranges,
         "0.25..2.5 mm", means with a standard deviation, "1.6 um +- 0.2 um", or measured
         values, {"measured": ["1.5 um", "1.7 um"]}. Tables and plots then have quantiles, as
         `uncertainty`; `central` is the joint of the medians.
@@ -213,6 +218,7 @@ class Joint(JointQuantities, Displayed):
     friction: Any = None  # ArrayLike or a range
     direction: str | None = None
     gas: str | Gas | Mapping[str, Any] = "air"
+    seal: Mapping[str, Any] | None = None
     theory: str | Theory | None = None
     surface: AnySurface = dataclasses.field(init=False)
     interface: Interface = dataclasses.field(init=False)
@@ -252,7 +258,8 @@ class Joint(JointQuantities, Displayed):
         # from here on every route reads the modulus and the hardness with their unit
         bodies = Bodies.of(self.bodies).with_stress_unit(PLAIN_STRESS)
         object.__setattr__(self, "bodies", bodies)
-        interface = Interface(self.friction, self.direction, Gas.of(self.gas))
+        checked_seal(self.seal)
+        interface = Interface(self.friction, self.direction, Gas.of(self.gas), self.seal)
         object.__setattr__(self, "interface", interface)
         self._check()
 
@@ -275,7 +282,7 @@ class Joint(JointQuantities, Displayed):
     @property
     def _typed(self) -> dict[str, Any]:
         """The arguments that have numbers."""
-        names = (*FACES, "nominal_area", "friction", "gas", "bodies")
+        names = (*FACES, "nominal_area", "friction", "gas", "seal", "bodies")
         return {name: getattr(self, name) for name in names}
 
     @property
@@ -427,7 +434,20 @@ class Joint(JointQuantities, Displayed):
             "accommodation": gas.accommodation,
             "friction": self.friction,
         }
+        numbers |= self._arrays_of_seal
         return {name: value for name, value in numbers.items() if value is not None}
+
+    @property
+    def _arrays_of_seal(self) -> dict[str, Any]:
+        """Numbers of the seal that may be arrays, by name, and those of its gas."""
+        seal = dict(self.seal or {})
+        gas = seal.pop("gas", None)
+        seal |= gas if isinstance(gas, Mapping) else {}
+        return {
+            f"seal.{name}": each
+            for name, each in seal.items()
+            if not isinstance(each, str)
+        }
 
     @property
     def _is_labelled(self) -> bool:
@@ -838,6 +858,12 @@ class Joint(JointQuantities, Displayed):
 
     def described(self, by: str, value: Any) -> Described:
         """All numbers of the joint and the quantity at which it is asked for, for derivatives by each."""
+        batches = [name for name, each in self._arrays_of_seal.items() if np.ndim(each)]
+        if batches:
+            raise InputError(
+                f"derivatives are of one seal, and {', '.join(batches)} have several numbers: "
+                "make a Joint of each"
+            )
         chosen = resolve(self.theory, self.surface)
         in_units = self._in_units
         return Described.of(
@@ -1092,7 +1118,7 @@ class Joint(JointQuantities, Displayed):
             if self.bodies.conductivity == self.pair.conductivities:
                 facts["conductivities"] = self.pair.ranges_of_conductivity
             if hardness is None:
-                hardness = f"not known: name the temper of {self.pair.softer.name}"
+                hardness = self.pair.without_hardness
         in_units = self._in_units
         facts["E_star"] = shown(in_units.E_star, str(in_units.units.stress))
         if is_array(hardness):
@@ -1104,6 +1130,10 @@ class Joint(JointQuantities, Displayed):
             )
         facts["theory"] = theory_text(self.surface, self.theory)
         facts["gas"] = Gas.of(self.gas).name
+        if self.seal is not None:
+            facts["seal"] = ", ".join(
+                f"{name} {each}" for name, each in self.seal.items()
+            )
         facts["surface"] = repr(self.surface)
         assumed = assumptions(self.surface)
         if assumed:

@@ -34,7 +34,11 @@ from mbma_tables.common.progress import doing, shown
 from mbma_tables.contacts.contact import contact
 from mbma_tables.contacts.quantities import registry
 from mbma_tables.contacts.quantities.declaration import DIMENSIONLESS, Quantity
-from mbma_tables.contacts.quantities.leakage import flow_coefficient, power_of_flow
+from mbma_tables.contacts.quantities.leakage import (
+    flow_coefficient,
+    leak_rate,
+    power_of_flow,
+)
 from mbma_tables.contacts.result import Contact, panel_label
 from mbma_tables.design.specimen import surface_of_entries
 from mbma_tables.surfaces.any_surface import AnySurface
@@ -181,6 +185,16 @@ def relative_scatter(pressed: Contact, name: str) -> Any:
     return power * declared.error_sign * scatter
 
 
+def model_error(pressed: Contact, name: str, deviations: Any) -> Any:
+    """ln of a quantity with the model's error, so many standard deviations, over that without."""
+    if name != leak_rate.name:
+        return deviations * relative_scatter(pressed, name)
+    of_flow = deviations * relative_scatter(pressed, flow_coefficient.name)
+    seal = pressed.interface.seal
+    assert seal is not None
+    return pressed.leakage.error_of_rate(seal, of_flow, deviations)
+
+
 def names_by_default(pressed: Contact) -> list[str]:
     """Names of the quantities that have a model uncertainty at a pressure."""
     return [
@@ -215,6 +229,7 @@ def _evaluated(
     last: FloatArray,
     load: Load,
     names: Sequence[str],
+    deviations: FloatArray,
 ) -> _Batch:
     """The contacts of all draws: one batch, or one after the other where the batch is refused."""
     inputs = description.inputs
@@ -222,41 +237,46 @@ def _evaluated(
     pressures = load.at_all(last)
     try:
         pressed = description.make(typed)(pressures)
-        batches = [_of_contact(pressed, names, (len(last), len(load.given)))]
+        shape = (len(last), len(load.given))
+        batches = [_of_contact(pressed, names, shape, deviations[:, None])]
     except InputError:
         # a number out of range is refused again there
         rows = [load.at(level) for level in last.tolist()]
-        batches = list(_one_by_one(description, typed, rows, names))
+        batches = list(_one_by_one(description, typed, rows, names, deviations))
     reasons: dict[str, NDArray[np.bool_]] = {}
     for part in batches:
         for reason, mask in part[3].items():
             here = np.asarray(mask.any(axis=0))
             reasons[reason] = reasons.get(reason, np.False_) | here
-    values, scatter, valid = (
+    values, errors, valid = (
         list(column) for column in zip(*[p[:3] for p in batches], strict=True)
     )
     return (
         {name: np.concatenate([each[name] for each in values]) for name in names},
-        {name: np.concatenate([each[name] for each in scatter]) for name in names},
+        {name: np.concatenate([each[name] for each in errors]) for name in names},
         np.concatenate(valid),
         reasons,
     )
 
 
-def _of_contact(pressed: Contact, names: Sequence[str], shape: tuple[int, int]) -> _Batch:
-    """Values, scatter, validity and reasons of a contact, each in the shape of rows and pressures."""
+def _of_contact(
+    pressed: Contact, names: Sequence[str], shape: tuple[int, int], deviations: Any
+) -> _Batch:
+    """Values, the model's errors of their ln, validity and reasons of a contact, each in the shape of rows and pressures."""
     values = {
         name: np.broadcast_to(np.asarray(pressed.quantity(name), float), shape)
         for name in names
     }
-    scatter = {
-        name: np.broadcast_to(relative_scatter(pressed, name), shape) for name in names
+    errors = {
+        name: np.broadcast_to(model_error(pressed, name, deviations), shape)
+        for name in names
     }
-    valid = np.broadcast_to(pressed.valid, shape)
+    judged = pressed.judged(names)
+    valid = np.broadcast_to(judged.valid, shape)
     reasons = {
-        reason: np.broadcast_to(mask, shape) for reason, mask in pressed.reasons.items()
+        reason: np.broadcast_to(mask, shape) for reason, mask in judged.reasons.items()
     }
-    return values, scatter, valid, reasons
+    return values, errors, valid, reasons
 
 
 def _one_by_one(
@@ -264,6 +284,7 @@ def _one_by_one(
     typed: Mapping[str, Any],
     loads: Sequence[list[Any]],
     names: Sequence[str],
+    deviations: FloatArray,
 ) -> Iterator[_Batch]:
     """The draws one after the other, where their contacts make no batch."""
     with shown("draws"):
@@ -271,7 +292,7 @@ def _one_by_one(
             doing(f"draw {k + 1} of {len(loads)}", k / len(loads))
             one = {name: entries[k][0] for name, entries in typed.items()}
             pressed = description.make(one)(pressures)
-            yield _of_contact(pressed, names, (1, len(pressures)))
+            yield _of_contact(pressed, names, (1, len(pressures)), deviations[k])
 
 
 def _standard_normal(levels: FloatArray) -> FloatArray:
@@ -280,10 +301,10 @@ def _standard_normal(levels: FloatArray) -> FloatArray:
     return np.asarray(ndtri(levels))
 
 
-def _with_model(values: FloatArray, scatter: FloatArray, error: FloatArray) -> FloatArray:
-    """Values with the model's error; as they are at pressures where its scatter is not known."""
-    is_known = np.isfinite(scatter).all(axis=0)
-    return values * np.exp(error[:, None] * np.where(is_known, scatter, 0.0))
+def _with_model(values: FloatArray, errors: FloatArray) -> FloatArray:
+    """Values with the model's errors of their ln; as they are at pressures where these are not known."""
+    is_known = np.isfinite(errors).all(axis=0)
+    return values * np.exp(np.where(is_known, errors, 0.0))
 
 
 def _basis(numbers: FloatArray) -> FloatArray:
@@ -345,7 +366,8 @@ class Uncertainty(Displayed):
         for the whole range; quantiles are then those of the inputs alone. What is missing
         to 1 is of inputs together.
     valid : ndarray of bool
-        Whether contacts of the whole range of every input are of a tested kind, by pressure.
+        Whether contacts of the whole range of every input are of a tested kind, by pressure;
+        with quantities of the flow, whether it is, too.
     reasons : dict
         Why not, with the mask of the pressures where it applies to a part of the range.
     draws : int
@@ -534,16 +556,17 @@ def uncertainty_of(
     drawn = description.drawn(of_inputs)
     # of the load, if it is a distribution: the last input then
     last = of_inputs[:, -1] if description.inputs else np.zeros(len(of_inputs))
-    values, scatter_of, valid, reasons = _evaluated(
-        description, drawn, last, load, _names(central, quantities)
-    )
     error = _standard_normal(description.of_model(uniform))
+    names = _names(central, quantities)
+    deviations = np.concatenate([np.zeros(len(corners)), error])
+    values, errors, valid, reasons = _evaluated(
+        description, drawn, last, load, names, deviations
+    )
     columns = {name: rows[-draws:] for name, rows in drawn.items()} | {MODEL: error}
     bands = {}
     logarithms = []
     for name, rows in values.items():
-        scatter = scatter_of[name][-draws:]
-        table = _with_model(rows[-draws:], scatter, error)
+        table = _with_model(rows[-draws:], errors[name][-draws:])
         bands[name] = np.quantile(table, levels, axis=0)
         with np.errstate(divide="ignore", invalid="ignore"):
             logarithms.append(np.where((table > 0).all(axis=0), np.log(table), table))
@@ -553,8 +576,7 @@ def uncertainty_of(
     for k, name in enumerate(bands):
         own = slice(k * len(load.given), (k + 1) * len(load.given))
         shares[name] = {of: share[own] for of, share in fitted.items()}
-        scatter = scatter_of[name][-draws:]
-        is_stated = np.isfinite(scatter).all(axis=0)
+        is_stated = np.isfinite(errors[name][-draws:]).all(axis=0)
         shares[name][MODEL] = np.where(is_stated, shares[name][MODEL], np.nan)
     return Uncertainty(
         np.ravel(central.pressure),
@@ -614,7 +636,7 @@ class ReplicaContact:
         declared, _ = _uncertain(name)
         if declared.uncertainty is None or not declared.error_sign:
             return value
-        return value * np.exp(self.model * relative_scatter(self.contact, name))
+        return value * np.exp(model_error(self.contact, name, self.model))
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or name not in registry.registry():

@@ -136,8 +136,8 @@ def drawing_of(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]
         maps = f"the {row['maps']} maps of it" if int(row["maps"]) else "any process"
         assumed["skewness and lay"] = (
             f"are those of {maps} (docs/fidelity.md): standard deviations of "
-            f"{row['area_spread']} of ln area, {row['gap_spread']} of ln gap and "
-            f"{row['stiffness_spread']} of ln stiffness"
+            f"{row['area_spread']} of ln area, {row['gap_spread']} of ln gap, "
+            f"{row['stiffness_spread']} of ln stiffness and {row['flow_spread']} of ln flow"
         )
     return numbers, assumed
 

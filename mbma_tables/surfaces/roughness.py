@@ -114,11 +114,9 @@ def spread_of_processes(provenance: Iterable[Mapping[str, Any]], kind: str) -> f
     """Standard deviation of ln of a law's answer for faces of the processes of a surface's records; 0 without one.
 
     `kind` is "area", "gap", "stiffness" or "flow". It is that of maps of the process, whose skewed
-    heights, lay and spectrum Ra does not tell; of two faces the larger. Flow is about the cube
-    of gaps.
+    heights, lay and spectrum Ra does not tell; of two faces the larger. That of flow is along
+    and across the lay.
     """
-    if kind == "flow":
-        return 3 * spread_of_processes(provenance, "gap")
     found = 0.0
     for record in provenance:
         process = record.get("process")

@@ -20,6 +20,7 @@ from mbma_tables import (
     uncertainty,
 )
 from mbma_tables.common.distributions import distribution_of
+from mbma_tables.surfaces.roughness import processes
 
 FACE = {"hurst": 0.8, "longest": "500 um", "shortest": "8 um"}
 METALS = ("steel 4140 hard", "aluminium 6061 hard")
@@ -648,18 +649,17 @@ def test_commands_of_known_numbers_name_those_that_take_ranges():
         assert "mbma contact, joint and batch take ranges" in said
 
 
-def test_the_flow_of_faces_of_a_process_is_as_uncertain_as_the_cube_of_their_gap():
-    """It had the band of Gaussian faces, the gap one seven times as wide."""
+def test_the_flow_of_faces_of_a_process_is_as_uncertain_as_that_of_maps_of_it():
+    """It had the band of Gaussian faces, seven times narrower than that of the cube of the gap."""
     face = {"Ra": "0.1 um", "process": "lapped"}
     joint = Joint(face, face, bodies="steel 304 soft", nominal_area="3 cm^2")
-    names = ["mean_separation", "flow_coefficient", "hydraulic_aperture"]
+    names = ["flow_coefficient", "hydraulic_aperture"]
     drawn = joint.uncertainty("30 MPa", quantities=names)
-    gap, flow, aperture = (
-        np.log(drawn.quantiles[name][-1, 0] / drawn.quantiles[name][0, 0])
-        for name in names
-    )
-    assert flow == pytest.approx(3 * gap, rel=0.05)
-    assert aperture == pytest.approx(gap, rel=0.05)
+    flow, aperture = (np.ptp(np.log(drawn.quantiles[name])) for name in names)
+    of_maps = stats.norm.ppf(0.95) - stats.norm.ppf(0.05)
+    of_maps *= float(processes()["lapped"]["flow_spread"])
+    assert flow == pytest.approx(of_maps, rel=0.05)
+    assert aperture == pytest.approx(flow / 3, rel=1e-6)
     replica = joint.replicas(2)[0].at_pressure("30 MPa")
     assert replica.hydraulic_aperture == pytest.approx(
         np.cbrt(replica.flow_coefficient), rel=1e-12

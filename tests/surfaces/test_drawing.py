@@ -303,7 +303,7 @@ def test_machined_maps_lie_in_the_bands_of_their_Ra():
 def test_spreads_are_those_of_the_maps():
     own = [part for part in campaign.parts() if part.family == "milled"]
     of_maps = [errors(one) for one in reduced(own)]
-    for kind in ("area", "gap", "stiffness"):
+    for kind in ("area", "gap", "stiffness", "flow"):
         found = np.sqrt(np.mean(np.concatenate([each[kind] for each in of_maps]) ** 2))
         stated = float(processes()["milled"][f"{kind}_spread"])
         assert found == pytest.approx(stated, abs=0.001)

@@ -1,4 +1,4 @@
-"""What is between two bodies besides their roughness: friction, the direction of shear, a gas."""
+"""What is between two bodies besides their roughness: friction, the direction of shear, a gas, a seal's fluid."""
 
 from __future__ import annotations
 
@@ -76,6 +76,8 @@ class Interface:
     friction: ArrayLike | None = None  # coefficient of friction
     direction: str | None = None  # of the shear, "along" or "across" the lay
     gas: Gas | None = None
+    #: arguments of `Leakage.gas` or `Leakage.liquid` by name, for `leak_rate`
+    seal: Mapping[str, Any] | None = None
 
 
 NOTHING_BETWEEN = Interface()

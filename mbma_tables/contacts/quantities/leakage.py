@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import inspect
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -18,8 +19,10 @@ from mbma_tables.common.arguments import (
     filled,
     finite_array,
     is_labelled,
+    nearest,
     positive_array,
     require,
+    require_name,
     rows,
 )
 from mbma_tables.common.display import Displayed, Variable, shown
@@ -27,6 +30,7 @@ from mbma_tables.common.errors import InputError
 from mbma_tables.common.plots import draw_compression, leakage_label, pressure_label
 from mbma_tables.common.shared import shared, shared_property
 from mbma_tables.common.units import Dimension, Units, factor
+from mbma_tables.contacts.quantities.conductances import UNIT_OF_LENGTH
 from mbma_tables.contacts.quantities.declaration import (
     DIMENSIONLESS,
     Quantity,
@@ -39,8 +43,13 @@ from mbma_tables.contacts.quantities.effective_medium import (
     contact_factor,
     wide_gap,
 )
-from mbma_tables.contacts.quantities.gas_flow import gas_for_flow, mass_flow
-from mbma_tables.contacts.quantities.state import State
+from mbma_tables.contacts.quantities.gas_flow import (
+    RATE_UNITS,
+    gas_for_flow,
+    gas_scatter,
+    mass_flow,
+)
+from mbma_tables.contacts.quantities.state import Need, State
 from mbma_tables.contacts.quantities.validity import reasons_with_masks, valid_where_none
 from mbma_tables.core import core
 from mbma_tables.surfaces.any_surface import agree
@@ -82,6 +91,22 @@ KEPT = 64  # spectra whose factors are kept
 MAP_AREAS = (0.003, 0.025, 0.067, 0.14, 0.39)
 LIKE_GAUSSIAN = (0.29, 0.60, 0.89, 1.9, 6.3)
 OTHERS = (0.84, 1.3, 1.9, 3.0, 7.3)
+# of leak rates of liquids, over m^3/s
+LIQUID_UNITS = {
+    "m^3/s": 1.0,
+    "mm^3/s": 1e9,
+    "ml/s": 1e6,
+    "ml/min": 6e7,
+    "ml/h": 3.6e9,
+    "l/h": 3.6e6,
+}
+OF_LIQUIDS = "mm^3/s"  # the unit of the leak rate of a seal that states none
+OF_GASES = "kg/s"  # that of `Leakage.gas`
+SEALS = (
+    "{'viscosity': '0.1 Pa s', 'pressure_drop': '0.5 MPa', 'width': '2 mm', 'length': '0.3 m'} "
+    "of a liquid, {'gas': 'helium', 'inlet': '2 bar', 'outlet': '1 bar', 'width': '2 mm', "
+    "'length': '0.3 m'} of a gas"
+)
 SIMULATED = 64.0  # zeta_1 up to which flow was simulated
 # yielded share of the contact up to which its flow is that of the elastic contact: gap and
 # area differ by less than this share, the scatter of flow is at least forty times as large
@@ -236,6 +261,8 @@ class Leakage(Displayed):
         viscosity: ArrayLike | str,
         pressure_drop: ArrayLike | str,
         width: ArrayLike | str,
+        length: ArrayLike | str | None = None,
+        unit: str | None = None,
     ) -> Any:
         """Volume that leaks per time and length of seal [length^2/time], K (p1 - p2)/(12 viscosity width).
 
@@ -248,11 +275,18 @@ class Leakage(Displayed):
             p1 - p2 [stress].
         width : array_like or str
             Of the seal, along the flow [length].
+        length : array_like or str, optional
+            Of the seal, across the flow [length], by which the result is multiplied; with
+            `unit` by default a metre.
+        unit : str, optional
+            Of the result: "m^3/s", "mm^3/s", "ml/s", "ml/min", "ml/h" or "l/h"; a plain
+            viscosity is then a stress times seconds.
 
         Raises
         ------
         InputError, OutOfRangeError
-            For numbers that are not positive and finite, and units that cannot be converted.
+            For numbers that are not positive and finite, units that cannot be converted, and
+            with `unit` a surface whose unit of length is not known.
 
         Examples
         --------
@@ -261,26 +295,35 @@ class Leakage(Displayed):
         >>> found = contact(seal, "10 MPa", area=0.1, theory="calibrated").leakage
         >>> f"{found.liquid('1e-3 Pa s', '0.1 MPa', '2 mm'):.1e} um^2/s"
         '3.0e+02 um^2/s'
+        >>> f"{found.liquid('1e-3 Pa s', '0.1 MPa', '2 mm', '0.3 m', 'ml/h'):.2f} ml/h"
+        '0.32 ml/h'
         """
+        units = self._contact.unit_system
+        if unit is not None:
+            if unit not in LIQUID_UNITS:
+                raise InputError(
+                    f"no unit of leak rates of a liquid is {unit!r}: {nearest(unit, LIQUID_UNITS)}"
+                )
+            metre = _metre(units, "a liquid")
+            length = metre if length is None else length
         found: dict[str, Any] = {
-            "viscosity": viscosity,
+            "viscosity": stress_of(viscosity),
             "pressure_drop": pressure_drop,
             "width": width,
         }
+        if length is not None:
+            found["length"] = length
         for name, value in found.items():
-            if name == "viscosity" and isinstance(value, str):
-                value, stress, seconds = value.strip().rpartition(" ")
-                if seconds != "s" or not stress:
-                    raise InputError(
-                        f"viscosity = {viscosity!r} must be a stress times seconds, such as '1e-3 Pa s'"
-                    )
-            number = self._contact.unit_system.number(name, value)
+            number = units.number(name, value)
             array = positive_array(name, number)
             found[name] = number if is_labelled(number) else array
         agree(K=self.K, **found)
-        return self.K * (
+        flow = self.K * (
             found["pressure_drop"] / (12 * found["viscosity"] * found["width"])
         )
+        if length is not None:
+            flow = flow * found["length"]
+        return flow if unit is None else flow * (LIQUID_UNITS[unit] / metre**3)
 
     def gas(
         self,
@@ -290,7 +333,7 @@ class Leakage(Displayed):
         width: ArrayLike | str,
         length: ArrayLike | str | None = None,
         temperature: ArrayLike = 293.15,
-        unit: str = "kg/s",
+        unit: str = OF_GASES,
     ) -> Any:
         """Gas that leaks per time, from continuum through slip to free molecules, at constant temperature.
 
@@ -326,12 +369,7 @@ class Leakage(Displayed):
         '1.9e-02 mbar l/s'
         """
         units = self._contact.unit_system
-        if units.length is None:
-            raise InputError(
-                "a leak rate of a gas beside lengths whose unit is not known: give the surface "
-                "its unit"
-            )
-        metre = factor("m", units.length)
+        metre = _metre(units, "a gas")
         pascals = Units(stress="Pa")
         own_numbers = dict(gas) if isinstance(gas, Mapping) else {}
         arrays = {
@@ -360,6 +398,105 @@ class Leakage(Displayed):
             return (per_metre * (size / metre) * flowing.in_unit(unit),)
 
         return self._contact.evaluate(rate, 1, arrays)[0]
+
+    def through(self, seal: Mapping[str, Any]) -> Any:
+        """Leak rate of a seal, which has the arguments of `gas` or of `liquid` by name, in the `unit_of_rate`."""
+        if "gas" in seal:
+            return self.gas(**seal)
+        return self.liquid(**{"unit": OF_LIQUIDS, **seal})
+
+    def error_of_rate(
+        self, seal: Mapping[str, Any], of_flow: Any, deviations: Any
+    ) -> Any:
+        """ln of a seal's leak rate with an error of ln K over that without.
+
+        A gas in narrow channels flows as a lower power of K than the first: the rate is that
+        of the other K. In quadrature to it is the error of the law of gases, so many of its
+        standard deviations.
+        """
+
+        def error(
+            theory: Theory, surface: Any, u: Any, E_star: Any, rate: Any, other: Any,
+            shift: Any, size: Any, area: Any,
+        ) -> tuple[FloatArray]:  # fmt: skip
+            with np.errstate(divide="ignore", invalid="ignore"):
+                found = np.log(other / rate)
+            if "gas" in seal:
+                found = np.copysign(np.hypot(found, size * gas_scatter(area)), shift)
+            return (np.where(rate == 0, shift, found),)
+
+        moved = dataclasses.replace(self, K=self.K * np.exp(of_flow))
+        arrays = {
+            "rate": self.through(seal),
+            "other": moved.through(seal),
+            "of_flow": of_flow,
+            "deviations": deviations,
+            "area": self._contact.area,
+        }
+        return self._contact.evaluate(error, 1, arrays)[0]
+
+    def scatter_of_rate(self, seal: Mapping[str, Any]) -> Any:
+        """Model uncertainty, one standard deviation of ln of a seal's leak rate; NaN where it is not known."""
+        more = self.error_of_rate(seal, self.scatter, 1.0)
+        return (more - self.error_of_rate(seal, -self.scatter, -1.0)) / 2
+
+
+def unit_of_rate(seal: Mapping[str, Any]) -> str:
+    """Unit of the leak rate of a seal."""
+    return str(seal.get("unit", OF_GASES if "gas" in seal else OF_LIQUIDS))
+
+
+def checked_seal(seal: Mapping[str, Any] | None) -> None:
+    """Reject a seal that has not the arguments of `Leakage.gas` or of `Leakage.liquid`."""
+    if seal is None:
+        return
+    if not isinstance(seal, Mapping):
+        raise InputError(f"seal has its numbers by name, such as {SEALS}, got {seal!r}")
+    of = Leakage.gas if "gas" in seal else Leakage.liquid
+    parameters = dict(inspect.signature(of).parameters)
+    del parameters["self"]
+    for name in seal:
+        if name not in parameters:
+            raise InputError(
+                f"seal has no {name!r}: with 'gas' it has those of Leakage.gas, else of "
+                f"Leakage.liquid; {nearest(str(name), parameters)}"
+            )
+    missing = [
+        name
+        for name, each in parameters.items()
+        if each.default is inspect.Parameter.empty and name not in seal
+    ]
+    if missing:
+        raise InputError(f"seal needs {', '.join(missing)}: it is such as {SEALS}")
+    require_name(
+        "unit of leak rates",
+        unit_of_rate(seal),
+        RATE_UNITS if "gas" in seal else LIQUID_UNITS,
+    )
+
+
+def _metre(units: Units, what: str) -> float:
+    """A metre in the unit of lengths, which a leak rate needs."""
+    if units.length is None:
+        raise InputError(
+            f"a leak rate of {what} beside lengths whose unit is not known: give the surface "
+            "its unit"
+        )
+    return factor("m", units.length)
+
+
+def stress_of(viscosity: Any) -> Any:
+    """The stress of a viscosity that is a text, "1e-3 Pa s"; lists by entry, numbers as they are."""
+    if isinstance(viscosity, list | tuple):
+        return [stress_of(each) for each in viscosity]
+    if not isinstance(viscosity, str):
+        return viscosity
+    text, stress, seconds = viscosity.strip().rpartition(" ")
+    if seconds != "s" or not stress:
+        raise InputError(
+            f"viscosity = {viscosity!r} must be a stress times seconds, such as '1e-3 Pa s'"
+        )
+    return text
 
 
 def leakage_of(contact: Any) -> Leakage:
@@ -747,3 +884,42 @@ def power_of_flow(declared: Quantity) -> float:
 def leakage_scatter(contact: State) -> Any:
     """Model uncertainty, one standard deviation of ln of the flow coefficient."""
     return contact.leakage.scatter
+
+
+SEAL = Need(
+    "seal",
+    lambda contact: contact.interface.seal is not None,
+    f"Joint(..., seal={SEALS})",
+)
+
+
+def _unit_of_rate(contact: State) -> str:
+    assert contact.interface.seal is not None
+    return unit_of_rate(contact.interface.seal)
+
+
+@quantity(
+    Dimension(length=3, time=-1),
+    "leak rate of the joint's seal",
+    needs=(SEAL, UNIT_OF_LENGTH),
+    made_of=("flow_coefficient",),
+    uncertainty="leak_rate_scatter",
+    error_sign=-1,
+    unit_of_state=_unit_of_rate,
+)
+def leak_rate(contact: State) -> Any:
+    """Leak rate of the joint's seal, in its unit: that of `Leakage.gas` or `Leakage.liquid`."""
+    assert contact.interface.seal is not None
+    return contact.leakage.through(contact.interface.seal)
+
+
+@quantity(
+    DIMENSIONLESS,
+    "model uncertainty: standard deviation of ln of the leak rate",
+    made_of=("leak_rate",),
+    spread_of_process="flow",
+    is_column=False,
+)
+def leak_rate_scatter(contact: State) -> Any:
+    """Model uncertainty, one standard deviation of ln `leak_rate`: that of the flow coefficient and of the law of gases."""
+    return contact.leakage.scatter_of_rate(contact.interface.seal)

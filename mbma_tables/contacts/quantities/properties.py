@@ -171,6 +171,18 @@ class ContactQuantities:
         return value
 
     @property
+    def leak_rate(self) -> Numbers:
+        """Leak rate of the joint's seal, in its unit: that of `Leakage.gas` or `Leakage.liquid`."""
+        value: Numbers = self.quantity("leak_rate")
+        return value
+
+    @property
+    def leak_rate_scatter(self) -> Numbers:
+        """Model uncertainty, one standard deviation of ln `leak_rate`: that of the flow coefficient and of the law of gases."""
+        value: Numbers = self.quantity("leak_rate_scatter")
+        return value
+
+    @property
     def median_gap(self) -> Numbers:
         """Median of the open gaps [length], by the law of docs/adhesion.md, of a simulated map by the map itself."""
         value: Numbers = self.quantity("median_gap")
@@ -532,6 +544,36 @@ class LawQuantities:
         value: Numbers = contact.quantity("leakage_scatter")
         return value
 
+    def leak_rate(
+        self: Any,
+        mean_separation: ArrayLike | str | None = None,
+        *,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
+    ) -> Numbers:
+        """Leak rate of the joint's seal, in its unit: that of `Leakage.gas` or `Leakage.liquid`."""
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
+        value: Numbers = contact.quantity("leak_rate")
+        return value
+
+    def leak_rate_scatter(
+        self: Any,
+        mean_separation: ArrayLike | str | None = None,
+        *,
+        separation: ArrayLike | str | None = None,
+        pressure: ArrayLike | str | None = None,
+        area: ArrayLike | None = None,
+    ) -> Numbers:
+        """Model uncertainty, one standard deviation of ln `leak_rate`: that of the flow coefficient and of the law of gases."""
+        contact = self.at(
+            mean_separation, separation=separation, pressure=pressure, area=area
+        )
+        value: Numbers = contact.quantity("leak_rate_scatter")
+        return value
+
     def median_gap(
         self: Any,
         mean_separation: ArrayLike | str | None = None,
@@ -880,6 +922,16 @@ class JointQuantities:
     def leakage_scatter(self: Any, pressure: ArrayLike | str) -> Numbers:
         """Model uncertainty, one standard deviation of ln of the flow coefficient."""
         value: Numbers = self.at_pressure(pressure).quantity("leakage_scatter")
+        return value
+
+    def leak_rate(self: Any, pressure: ArrayLike | str) -> Numbers:
+        """Leak rate of the joint's seal, in its unit: that of `Leakage.gas` or `Leakage.liquid`."""
+        value: Numbers = self.at_pressure(pressure).quantity("leak_rate")
+        return value
+
+    def leak_rate_scatter(self: Any, pressure: ArrayLike | str) -> Numbers:
+        """Model uncertainty, one standard deviation of ln `leak_rate`: that of the flow coefficient and of the law of gases."""
+        value: Numbers = self.at_pressure(pressure).quantity("leak_rate_scatter")
         return value
 
     def median_gap(self: Any, pressure: ArrayLike | str) -> Numbers:

@@ -13,7 +13,8 @@ import types
 from collections.abc import Mapping
 
 from mbma_tables.common import units as of_arguments
-from mbma_tables.common.arguments import require_name
+from mbma_tables.common.arguments import nearest
+from mbma_tables.common.errors import InputError
 from mbma_tables.common.units import HEAT_CONDUCTANCE, Units
 from mbma_tables.contacts.quantities.declaration import Quantity
 from mbma_tables.contacts.quantities.state import Need
@@ -84,6 +85,11 @@ def needs_of(name: str) -> list[Need]:
     return list(needs)
 
 
+def names_of_parts(name: str) -> set[str]:
+    """Names of a quantity and of all that it is made of by its declaration."""
+    return {name}.union(*map(names_of_parts, registry()[name].made_of))
+
+
 def in_files() -> dict[str, Quantity]:
     """Quantities by their names in files for other programs: their own and further ones."""
     quantities = dict(registry())
@@ -103,8 +109,19 @@ def law_functions() -> dict[str, Quantity]:
 
 
 def get(name: str) -> Quantity:
-    """A quantity by its name; the error for an unknown one names the nearest."""
-    require_name("quantity", name, registry())
+    """A quantity by its name; the error for an unknown one names the nearest, and all."""
+    if name not in registry():
+        known = [*registry()]
+        if name in in_files():
+            hint = f"did you mean {in_files()[name].name!r}? "
+        else:
+            # a model uncertainty is not meant where its name is not begun
+            meant = [n for n in known if "scat" in str(name) or not n.endswith("scatter")]
+            near = nearest(str(name), meant)
+            hint = f"{near} " if near.endswith("?") else ""
+        raise InputError(
+            f"no quantity is named {name!r}; {hint}known are {', '.join(known)}"
+        )
     return registry()[name]
 
 

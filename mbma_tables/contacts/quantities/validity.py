@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mbma_tables.bodies.materials import ELASTIC_PSI, HARDEST, is_name
+from mbma_tables.bodies.materials import ELASTIC_PSI, HARDEST
 from mbma_tables.common.arguments import FloatArray, any_labelled
 from mbma_tables.common.units import factor
 from mbma_tables.contacts.quantities.state import State
@@ -108,13 +108,7 @@ def _reasons_of_bodies(
         )
         return {text: is_elastic & (mean_pressure > HARDEST * gigapascal)}
     softer = bodies.pair.softer
-    soft, hard = softer.hardness
-    remedy = f"Bodies(metals=..., hardness='{soft:g} GPa')"
-    if soft != hard:
-        remedy = f"Bodies(metals=..., hardness=...), '{soft:g} GPa' to '{hard:g} GPa'"
-        if is_name(f"{softer.name} hard"):
-            tempers = f"'{softer.name} soft' or '{softer.name} hard'"
-            remedy = f"its temper, {tempers}, or {remedy}"
+    soft = softer.hardness[0]
     yields = E_star * np.asarray(surface.rms_gradient) > ELASTIC_PSI * soft * gigapascal
-    text = f"{softer.name} yields here: give {remedy}"
+    text = f"{softer.name} yields here: give {bodies.pair.remedy}"
     return {text: is_elastic & (yields | (mean_pressure > soft * gigapascal))}

@@ -23,7 +23,7 @@ from mbma_tables.common.arguments import (
 from mbma_tables.common.errors import InputError
 from mbma_tables.common.toml_files import check, read_toml
 from mbma_tables.common.units import require_surface
-from mbma_tables.contacts.quantities.registry import registry
+from mbma_tables.contacts.quantities.registry import names_of_parts, registry
 from mbma_tables.contacts.question import PRESCRIBED, Question
 from mbma_tables.contacts.result import Contact, Setup
 from mbma_tables.design.scenes.plan import LEAKAGE, Plan, make_plan
@@ -55,11 +55,6 @@ MAX_RTOL = 0.1
 MAX_SECONDS = 1e6
 DEFAULT_RTOL = 1e-6  # of MBMA
 DEFAULT_RTOL_OF_OTHERS = 1e-4  # of theories without a certified table
-
-
-def names_of_parts(name: str) -> set[str]:
-    """Names of a quantity and of all that it is made of by its declaration."""
-    return {name}.union(*map(names_of_parts, registry()[name].made_of))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
