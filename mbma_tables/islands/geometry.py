@@ -12,9 +12,8 @@ roughness finer than q, the paper's (27) and (30) read
 
     T(q_d) = (4 beta/3 delta s/h_rms)^2,   T(q_u) = (phi/(1 + phi) delta)^2,   h_d = sqrt(T(q_d)),
 
-with floors of q_d and q_u at multiples of q_L, the spectrum's `longest`. On a self-affine
-spectrum these are the paper's equations; s/h_rms is (1 - zeta_1^(-2H))^(-1/2) on these and
-1 on any other.
+with floors of q_d and q_u at multiples of q_L, the spectrum's `longest`, and s^2 = h_rms^2 and
+the variance `beyond` q_1. On a self-affine spectrum these are the paper's equations.
 """
 
 from typing import Any, NamedTuple
@@ -156,13 +155,11 @@ class Floors(NamedTuple):
 
 
 def s_over_h_rms(surface: MeasuredSurface) -> float:
-    """(1 - zeta_1^(-2H))^(-1/2) of a self-affine spectrum, 1 of any other."""
-    hurst = surface.hurst
-    return (
-        1.0
-        if hurst is None
-        else float(1 / np.sqrt(-np.expm1(-2 * hurst * np.log(surface.zeta_1))))
-    )
+    """s/h_rms: s^2 is h_rms^2 and the variance beyond q1, if the spectrum went on there.
+
+    (1 - zeta_1^(-2H))^(-1/2) of a self-affine spectrum.
+    """
+    return float(np.sqrt(1 + surface.beyond / surface.m0))
 
 
 def floors_of(surface: MeasuredSurface, variant: Variant) -> Floors:

@@ -51,6 +51,10 @@ WIDEST = 1.5
 SCAN = 400
 # largest deviation of ln C from one power law for which a spectrum counts as self-affine
 SAME_LAW = 0.01
+# ratio of wavenumbers at the end of a spectrum by which it is continued, that of the narrowest
+# spectrum; and the least Hurst exponent there
+TOP = MIN_ZETA_1
+LEAST_HURST = 0.05
 # ratio of wavenumbers in a sum of spectra, which deviates from power laws between them by
 # at most 1e-4
 FINE = 1.02
@@ -263,6 +267,23 @@ class SpectralSurface(AnySurface):
             if straight and 0 < exponent <= 1 + SAME_LAW
             else None
         )
+
+    @functools.cached_property
+    def beyond(self) -> float:
+        """Height variance [length^2] of waves shorter than the shortest, if the spectrum went on.
+
+        It goes on by the power law whose variances from q1/3 to q1/sqrt(3), and from there
+        to q1, are its own: a continuous function of the spectrum, also of that of two faces
+        that differ little, which has a jump at each end. Below a Hurst exponent of 0.05, as
+        the variance of such a power law has no bound, it falls to 0, which it is where the
+        variances rise.
+        """
+        last, both = self.laws.above(self.laws.place(self.q1 / TOP ** np.array([0.5, 1])))
+        if not last:
+            return 0.0
+        # of a power law 3^H - 1
+        fall = max(both / last - 2, 0.0)
+        return float(last * fall / max(fall, TOP**LEAST_HURST - 1) ** 2)
 
     @functools.cached_property
     def longest(self) -> float:

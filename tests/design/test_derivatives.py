@@ -295,7 +295,9 @@ def test_random_quantities_by_random_numbers():
     assert [one for one in smooth if not one.error <= ERROR] == []
 
 
-@pytest.mark.parametrize(("theory", "apart"), [("persson", 1e-9), ("calibrated", 3e-7)])
+@pytest.mark.parametrize(
+    ("theory", "apart"), [("persson", 1e-9), ("calibrated", 3e-7), ("mbma", 2e-9)]
+)
 def test_faces_alike_are_the_limit_of_two_bands(theory, apart):
     """One self-affine surface, by a table, and a sum of spectra that differ by less than this."""
     band = {"hurst": 0.6, "shortest": 8.0, "unit": "um"}

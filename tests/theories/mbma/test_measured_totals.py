@@ -60,6 +60,69 @@ def test_a_sampled_power_law_has_the_totals_of_its_five_numbers(variant, hurst, 
             )
 
 
+APART = 1e-9
+
+
+@pytest.mark.parametrize("island_model", ["universal", "exact"])
+@settings(max_examples=6, deadline=None)
+@given(
+    hurst=st.floats(0.06, 1.0),
+    log_zeta=st.floats(0.6, 4.0),
+    heights=st.floats(0.1, 10.0),
+    sides=st.tuples(*[st.sampled_from([-APART, 0.0, APART])] * 3).filter(any),
+)
+def test_faces_alike_are_the_limit_of_faces_that_differ(
+    island_model, hurst, log_zeta, heights, sides
+):
+    """One self-affine surface, and a sum of two spectra with a jump at their ends."""
+    hurst = min(hurst, 1 - APART)
+    face = Surface(hurst, 1.0, 10**log_zeta, 1.0, 3.0)
+    numbers = np.array([hurst, 1.0, 10**log_zeta])
+    alike, near = (
+        face.combined(
+            Surface(*numbers * (1 + share * np.array(sides)), heights, 3 * heights)
+        )
+        for share in (0, 1)
+    )
+    assert isinstance(alike, Surface)
+    assert not isinstance(near, Surface)
+    theory = Mbma(island_model=island_model, outside="exact")
+    d = float(alike.h_max) * (1 - np.array([0.01, 0.3, 1.0, 1.5]))
+    one, two = (theory.totals(surface, d, slopes=True) for surface in (alike, near))
+    # the numbers themselves change force and area by at most a hundred times their own change
+    bound = one.error + two.error + 100 * APART
+    for name in ("pressure", "area"):
+        missed = np.abs(getattr(two, name) / getattr(one, name) - 1)
+        assert (missed <= bound).all()
+
+
+def test_a_spectrum_goes_on_as_its_power_law_if_it_has_one():
+    """Variance beyond the shortest wavelength: of self-affine ones, of sums, and where spectra rise."""
+    face = five_numbers(0.4, 30.0)
+    of_face = float(face.s**2 - face.h_rms**2)
+    assert sampled(face, 7).beyond == pytest.approx(of_face, rel=1e-12)
+    # of two power laws no more than both have, and continuous where one vanishes
+    rougher = five_numbers(0.2, 60.0)
+    both = face.combined(rougher).sampled().beyond
+    assert both < of_face + float(rougher.s**2 - rougher.h_rms**2)
+    less = Surface(0.2, 0.01, 0.6, 1e-6, 3.0)
+    assert rougher.combined(less).sampled().beyond == pytest.approx(
+        float(rougher.s**2 - rougher.h_rms**2), rel=1e-9
+    )
+    # equal variances in equal octaves have no end, and less than that is none
+    q = np.geomspace(1, 30, 30)
+    steps = [
+        Surface.from_spectrum(q, q**power, h_max=3.0).beyond
+        for power in (-2.1, -2.05, -2.01, -2.0, -1.9)
+    ]
+    assert np.diff(steps[:2]) != 0
+    assert np.all(np.diff(steps[1:4]) < 0)
+    assert steps[3:] == [pytest.approx(0.0, abs=1e-9), 0.0]
+    # a last sample that stands alone holds no height
+    alone = Surface.from_spectrum([1, 2, 3, 4, 20], [1, 1, 0, 0, 1], h_max=3.0)
+    assert alone.beyond == 0.0
+
+
 @settings(max_examples=15, deadline=None)
 @given(st.integers(0, 1000), st.floats(0.5, 4.0))
 def test_errors_hold_and_slopes_are_slopes(seed, share):

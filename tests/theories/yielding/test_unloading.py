@@ -318,6 +318,22 @@ def test_stated_scatter_is_at_the_pressure_of_a_contact_area(theory):
     assert engine._pressure_ratio(peak, np.array(0.0)) == pytest.approx(0.01)
 
 
+def test_the_lightest_contacts_are_smooth_enough_for_a_law():
+    """Where the branch ends far below h_max, the contacts at 1e-10 of the largest pressure are apart from its end."""
+    surface = Surface(0.8566, 2364.6, 41486.0, 8.384e-7, 2.5173e-6, unit="m")
+    bodies = Bodies("24.454 GPa", hardness="73.384 MPa", largest_pressure="14.3656 MPa")
+    branch = contact_law(surface, bodies, theory="calibrated", rtol=1e-5)
+    pressures = 14.3656e-3 * np.array([2e-10, 1e-9, 1e-6, 1e-3, 0.1, 0.9])
+    found = contact(surface, bodies, pressure=pressures, theory="calibrated")
+    again = contact(surface, bodies, separation=found.separation, theory="calibrated")
+    for name in ("pressure", "area"):
+        np.testing.assert_allclose(
+            getattr(branch, name)(separation=found.separation),
+            getattr(again, name),
+            rtol=branch.error,
+        )
+
+
 def test_the_energy_given_back_has_a_scatter_of_its_own():
     """That of simulations, with that of the stiffness at the largest pressure; that of first loading begins a branch."""
     pressed = unloaded(["10 MPa", "99.999 MPa", "100 MPa"])
