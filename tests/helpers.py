@@ -117,7 +117,11 @@ def refusals(ask, *rows, error=InputError):
         kind = given.pop() if isinstance(given[-1], type) else error
         with pytest.raises(kind, match=said) as caught:
             ask(*given)
-        assert "\n" not in str(caught.value)
+        text = str(caught.value)
+        assert "\n" not in text
+        assert "np." not in text
+        # one traceback, not two
+        assert caught.value.__suppress_context__ or caught.value.__context__ is None
 
     return test
 

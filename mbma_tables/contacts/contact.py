@@ -243,10 +243,12 @@ def _inverted(
         if name == "pressure":
             return theory.at_force(surface, wanted)
         return theory.mean_separation_at(surface, name, wanted), None
-    except OutOfRangeError:
-        if name == "pressure":
-            _refuse_pressure(setup, theory, surface, given, modulus, cap)
-        raise
+    except OutOfRangeError as fault:
+        refused = fault
+    # outside of the handler, so that users see one error and not two
+    if name == "pressure":
+        _refuse_pressure(setup, theory, surface, given, modulus, cap)
+    raise refused
 
 
 def _refuse_pressure(

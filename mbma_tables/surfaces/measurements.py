@@ -560,7 +560,7 @@ def grid_of(
         )
         raise InputError(
             f"a topography must have heights along {dimensions} axes and as many "
-            f"physical_sizes, got shape {np.shape(grid)} and {sizes}; {other}"
+            f"physical_sizes, got shape {np.shape(grid)} and {np.asarray(sizes).tolist()}; {other}"
         )
     extent = finite_array("physical_sizes", sizes)
     allowed = "in [1e-30, 1e30], x and y rising"

@@ -357,8 +357,7 @@ def _accuracy(traces: _Traces, high: float) -> dict[str, Any]:
 
 def _relative_error(powers: FloatArray) -> float:
     """Relative standard error of the root of a sum of independent powers."""
-    error: float = math.sqrt(powers @ powers / 2) / powers.sum() / 2
-    return error
+    return math.sqrt(powers @ powers / 2) / float(powers.sum()) / 2
 
 
 def _without_roll_off(share: float) -> dict[str, Any]:

@@ -121,7 +121,9 @@ def test_files_and_scans(tmp_path):
     ):
         assert found.h_rms == pytest.approx(plain.h_rms, rel=1e-9)
         assert found.rms_gradient == pytest.approx(plain.rms_gradient, rel=1e-4)
-    with pytest.raises(InputError, match="from_profile takes line scans"):
+        assert "np." not in str(found.provenance)
+    sides = rf"got shape \({POINTS},\) and \[{0.5 * POINTS}\]; .*from_profile takes line scans"
+    with pytest.raises(InputError, match=sides):
         Surface.from_map(library.UniformLineScan(line, 0.5 * POINTS))
     with pytest.raises(InputError, match="from_map takes maps"):
         Surface.from_profile(library.Topography(np.eye(40), (1, 1)))
