@@ -224,7 +224,7 @@ def _surface_facts(specimen: Specimen) -> tuple[dict[str, Any], list[str]]:
 def validity_of(
     answer: Contact, names: Iterable[str]
 ) -> tuple[list[str], dict[str, Any]]:
-    """Where quantities of contacts are not valid and why, and how they are loaded: lines of text, and machine-readable facts."""
+    """Where quantities of contacts are valid and why, or why not, and how they are loaded: lines of text, and machine-readable facts."""
     judged = answer.judged(names)
     valid = np.atleast_1d(judged.valid)
     reasons = {
@@ -236,11 +236,18 @@ def validity_of(
             f"{reason} ({len(places)})" for reason, places in reasons.items()
         )
         notes.append(f"not valid at {int((~valid).sum())} of {valid.size}: {listed}")
+    # that of a flow is on its own page
+    evidence = answer.evidence if judged is answer and valid.any() else None
+    if evidence:
+        notes.append(
+            f"valid at {int(valid.sum())} of {valid.size}: tested against {evidence}"
+        )
     if answer.loading:
         notes.append(f"loading: {answer.loading}")
     return notes, {
         "valid": valid.tolist(),
         "reasons": reasons,
+        "evidence": evidence,
         "loading": answer.loading or None,
     }
 
@@ -348,7 +355,7 @@ def report_answer(
     )
     notes += [
         f"theory {model.theory.name}{made}; {scale}",
-        "error: relative, numerical, beside the theory's scatter",
+        "error: relative, numerical; without the theory's scatter",
     ]
     facts = {
         "theory": model.theory.name,

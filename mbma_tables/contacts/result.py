@@ -532,6 +532,11 @@ class Contact(State, Displayed):
         """Reasons why entries are not `valid`, each with the mask of these entries as a plain array."""
         return reasons_with_masks(self, *self._reasons_of_contact)
 
+    @property
+    def evidence(self) -> str:
+        """What `valid` entries were compared with: simulated surfaces, the page on them, and the tested ranges."""
+        return self.theory_of(self.bodies).evidence(self.surface)
+
     def _facts(self) -> dict[str, str]:
         of_mbma = f" ({self.variant}, {self.island_model})" if self.variant else ""
         # of a large map
@@ -575,8 +580,10 @@ class Contact(State, Displayed):
             facts["loading"] = self.loading
         for name in names:
             facts[name] = self._shown(name)
-        if np.any(self.valid) and is_assumed_gaussian(self.surface):
-            facts["valid"] += ", if the face is Gaussian and isotropic"
+        if np.any(self.valid):
+            facts["evidence"] = self.evidence
+            if is_assumed_gaussian(self.surface):
+                facts["valid"] += ", if the face is Gaussian and isotropic"
         return facts
 
     @property

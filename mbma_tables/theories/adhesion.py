@@ -485,6 +485,10 @@ class Adhesive(Theory):
         reasons: tuple[str, ...] = self.elastic.reasons_of_flow()
         return reasons
 
+    def evidence(self, surface: AnySurface) -> str:
+        """That of the elastic contact, and the page on contacts with adhesion."""
+        return f"{self.elastic.evidence(surface)}; with adhesion docs/adhesion.md"
+
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation against simulations: of the elastic theory, of the gaps, of the attraction.
 

@@ -327,6 +327,14 @@ class Theory(abc.ABC):
         )
         return {text: beyond, **reasons}
 
+    def evidence(self, surface: AnySurface) -> str:
+        """What valid contacts of such a surface were compared with, in one line."""
+        name = self.scatter_name(surface)
+        if name not in shipped_deviations().log_rms:
+            return f"the scatter that theory {self.name!r} states"
+        by_map = self.by_heights(surface)
+        return tested.evidence(name, tested.BY_MAP if by_map else tested.BY_SPECTRUM)
+
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation of ln of a quantity against simulations, at A/A0 = `area`.
 

@@ -238,6 +238,12 @@ class Tabulated(Theory):
             **super().reasons(surface, answer, mean_separation),
         }
 
+    def evidence(self, surface: AnySurface) -> str:
+        original = self.stands_for
+        return (
+            super().evidence(surface) if original is None else original.evidence(surface)
+        )
+
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """That of the theory that the table stands for; NaN for one of a user."""
         original = self.stands_for

@@ -6,7 +6,7 @@ They are in the shipped file tested.csv, by theory, and for contacts with a hard
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -24,29 +24,69 @@ SIDE = 4.0
 # longest over shortest wavelength of the broadest surface that was simulated, once
 BROADEST = 256.0
 ROUNDING = 1e-9  # relative, of numbers beside the ends of these ranges
+ELASTIC = "elastic"
 WITH_HARDNESS = "hardness"
+# quantities whose ranges are those of theories that know all heights, and of those that know a spectrum
+BY_MAP = ("hurst", "bandwidth", "area")
+BY_SPECTRUM = (*BY_MAP, "heights")
+# quantities of tested.csv in texts
+LABELS = {
+    "hurst": "Hurst exponent",
+    "bandwidth": "longest over shortest wavelength",
+    "heights": "h_max/h_rms",
+    "area": "A/A0",
+    "eta": "hardness over E* times the rms gradient",
+}
 
 Range = tuple[float, float]
 
 
 @shared()
-def _rows() -> dict[tuple[str, str], dict[str, Range]]:
-    """Ranges by theory and contact, then by quantity, read once."""
-    rows: dict[tuple[str, str], dict[str, Range]] = {}
+def _records() -> dict[tuple[str, str], dict[str, dict[str, str]]]:
+    """Rows of the file by theory and contact, then by quantity, read once."""
+    found: dict[tuple[str, str], dict[str, dict[str, str]]] = {}
     for row in records(shipped_file("tested.csv")):
-        ranges = rows.setdefault((row["theory"], row["contact"]), {})
-        ranges[row["quantity"]] = float(row["least"]), float(row["most"])
-    return rows
+        found.setdefault((row["theory"], row["contact"]), {})[row["quantity"]] = row
+    return found
 
 
+def _rows(theory: str, contact: str) -> dict[str, dict[str, str]]:
+    """Rows by quantity: of elastic contacts those of all theories, or of one beyond."""
+    own = _records().get((theory, contact), {})
+    return own if contact == WITH_HARDNESS else {**_records()["any", contact], **own}
+
+
+def _ranges(theory: str, contact: str) -> dict[str, Range]:
+    rows = _rows(theory, contact).items()
+    return {name: (float(row["least"]), float(row["most"])) for name, row in rows}
+
+
+@shared()
 def elastic_ranges(theory: str = "") -> Mapping[str, Range]:
     """Tested ranges of elastic contacts: of all theories but the ones of maps, or with those of one beyond."""
-    return {**_rows()["any", "elastic"], **_rows().get((theory, "elastic"), {})}
+    return _ranges(theory, ELASTIC)
 
 
+@shared()
 def ranges_with_hardness(theory: str) -> Mapping[str, Range]:
     """Tested ranges of a theory with a hardness; empty where it was not compared."""
-    return _rows().get((theory, WITH_HARDNESS), {})
+    return _ranges(theory, WITH_HARDNESS)
+
+
+def evidence(theory: str, quantities: Collection[str], contact: str = ELASTIC) -> str:
+    """The simulated surfaces that such contacts were compared with, the page on them, and the ranges of these quantities."""
+    rows = _rows(theory, contact)
+    asked = [rows[name] for name in LABELS if name in rows and name in quantities]
+    counts: dict[str, int] = {}
+    for row in asked:
+        counts[row["evidence"]] = max(
+            int(row["surfaces"]), counts.get(row["evidence"], 0)
+        )
+    pages = ", ".join(dict.fromkeys(row["page"] for row in asked))
+    ranges = ", ".join(
+        f"{LABELS[row['quantity']]} {row['least']} to {row['most']}" for row in asked
+    ).replace(" to inf", " or more")
+    return f"{sum(counts.values())} simulated surfaces ({pages}), {ranges}"
 
 
 def below(values: Any, limits: Range) -> Any:
@@ -141,24 +181,30 @@ def bandwidth(surface: AnySurface) -> Any:
     return np.asarray(surface.zeta_1)
 
 
-def _has_low_hurst(surface: AnySurface, limits: Range) -> Any:
+def _of_the_exponent(
+    surface: AnySurface, least_hurst: Range, band: Range
+) -> dict[str, Any]:
     """Whether short wavelengths weigh more than with the least Hurst exponent.
 
-    Of a spectrum that is no power law, by its gradient: at equal height and band it is
-    larger than that of the least exponent.
+    A spectrum that is no power law, as of two faces, has no exponent. It is judged by its
+    gradient: at equal height and band it is larger than that of the least exponent. Bands
+    that are too narrow anyway are not judged.
     """
     hurst = getattr(surface, "hurst", 1.0)
     if hurst is not None:
-        return below(hurst, limits)
+        text = f"the Hurst exponent is below {least_hurst[0]:g}"
+        return {text: below(hurst, least_hurst)}
     ratio = bandwidth(surface)
-    least = 2 * limits[0]
+    least = 2 * least_hurst[0]
     # Eqs. (6) and (7) of a power law between 1/ratio and 1, in units of q1
     wide = np.maximum(ratio, 1 + 1e-9)
     squared_gradient = (1 - wide ** (least - 2)) / (2 - least)
     squared_height = (wide**least - 1) / least
     steepest = np.sqrt(squared_gradient / squared_height)
     steepness = surface.rms_gradient / (surface.h_rms * surface.q1)
-    return (ratio > 1) & (np.asarray(steepness) > steepest * (1 + ROUNDING))
+    text = f"short wavelengths have more of the height than with a Hurst exponent of {least_hurst[0]:g}"
+    is_steep = np.asarray(steepness) > steepest * (1 + ROUNDING)
+    return {text: ~below(ratio, band) & is_steep}
 
 
 def _of_the_surface(surface: AnySurface, by_heights: bool, theory: str) -> dict[str, Any]:
@@ -167,9 +213,8 @@ def _of_the_surface(surface: AnySurface, by_heights: bool, theory: str) -> dict[
     least, most = ranges["bandwidth"]
     narrow = f"the longest wavelength is less than {least:g} times the shortest"
     broad = f"the longest wavelength is more than {most:g} times the shortest"
-    hurst = ranges["hurst"]
     reasons = {
-        f"the Hurst exponent is below {hurst[0]:g}": _has_low_hurst(surface, hurst),
+        **_of_the_exponent(surface, ranges["hurst"], ranges["bandwidth"]),
         narrow: below(ratio, ranges["bandwidth"]),
         broad: above(ratio, ranges["bandwidth"]),
     }
@@ -177,7 +222,7 @@ def _of_the_surface(surface: AnySurface, by_heights: bool, theory: str) -> dict[
         return reasons
     heights = np.asarray(surface.h_max) / np.asarray(surface.h_rms)
     limits = ranges["heights"]
-    text = f"h_max/h_rms is outside {limits}"
+    text = f"h_max/h_rms is outside {limits[0]:g} to {limits[1]:g}"
     reasons[text] = below(heights, limits) | above(heights, limits)
     return reasons
 

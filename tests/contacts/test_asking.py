@@ -744,8 +744,8 @@ def test_theories_whose_answers_are_none_are_named(theory, asked):
 @pytest.mark.parametrize(
     ("process", "shown"),
     [
-        (None, "valid True, if the face is Gaussian and isotropic)"),
-        ("gaussian", "valid True)"),
+        (None, "valid True, if the face is Gaussian and isotropic, "),
+        ("gaussian", "valid True, evidence"),
         ("milled", "valid False)"),
     ],
 )
@@ -760,7 +760,7 @@ def test_what_numbers_leave_open_is_a_condition_of_validity(process, shown):
         process=process,
     )
     found = contact(face, Bodies("100 GPa"), pressure="100 MPa")
-    assert repr(found).endswith(shown)
+    assert shown in repr(found)
     # a difference of two such faces leaves the same open
     combined = face.combined(face)
-    assert repr(contact(combined, Bodies("100 GPa"), pressure="100 MPa")).endswith(shown)
+    assert shown in repr(contact(combined, Bodies("100 GPa"), pressure="100 MPa"))

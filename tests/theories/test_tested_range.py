@@ -7,6 +7,7 @@ from helpers import contact_of
 
 from generate.boundary_elements.evidence import evidence
 from mbma_tables import Bodies, InputError, Joint, Surface, contact, contact_law
+from mbma_tables.common.files import records, shipped_file
 from mbma_tables.theories import THEORIES, Calibrated, Mbma, Persson
 from mbma_tables.theories.hardness import with_hardness
 
@@ -212,7 +213,7 @@ def test_without_a_stated_scatter_nothing_is_valid():
         ({"q1": 0.32}, "less than 8 times the shortest"),
         ({"h_max": 0.3}, "h_max/h_rms is outside"),
         ({"h_max": 3.0}, "h_max/h_rms is outside"),
-        ({"hurst": 0.05}, "the Hurst exponent is below"),
+        ({"hurst": 0.05}, "Hurst exponent"),
         ({"q1": 60.0}, "times the shortest"),
     ],
 )
@@ -240,8 +241,61 @@ def test_short_wavelengths_of_a_bent_spectrum_weigh_like_a_low_hurst_exponent():
         assert surface.hurst is None
         pressed = contact(surface, area=0.1, theory="calibrated")
         assert bool(pressed.valid) == tested
-        low = [text for text in pressed.reasons if "the Hurst exponent" in text]
+        low = [text for text in pressed.reasons if "a Hurst exponent of 0.2" in text]
         assert bool(low) != tested
+
+
+def test_valid_contacts_name_what_they_were_compared_with():
+    face = Surface(hurst=0.8, q0=0.06, q1=1.9, h_rms=1.0, h_max=3.5)
+    elastic, hard, untested = (
+        contact(face, Bodies(hardness=hardness), area=area, theory="calibrated")
+        for hardness, area in ((np.inf, 0.1), (0.2, 0.1), (np.inf, 1e-4))
+    )
+    assert [bool(one.valid) for one in (elastic, hard, untested)] == [True, True, False]
+    assert elastic.evidence == (
+        "139 simulated surfaces (docs/fidelity.md), Hurst exponent 0.2 to 1, longest over shortest wavelength "
+        "8 to 512, h_max/h_rms 2.5 to 8, A/A0 0.001 to 0.97"
+    )
+    assert hard.evidence.startswith(elastic.evidence)
+    assert "; with a hardness 50 simulated surfaces (docs/yield.md), " in hard.evidence
+    for one in (elastic, hard):
+        assert f"evidence {one.evidence}" in repr(one)
+    assert "evidence" not in repr(untested)
+
+
+def test_numbers_of_simulated_surfaces_are_those_of_the_data():
+    counts = {}
+    for path, group in (
+        ("boundary_elements.nc", "elastic"),
+        ("boundary_elements.nc", "hardness"),
+        ("bandwidth.nc", "bandwidth"),
+    ):
+        with xr.open_dataset(f"docs/data/{path}", group=group) as data:
+            named = {
+                name: np.array(data[name].flag_meanings.split())[data[name].values]
+                for name in ("kind", "split")
+            }
+            own = named["split"] != "refine"
+            if group == "bandwidth":
+                own &= (data["shape"] == 0).values & (data.waves >= 2).values
+            is_self_affine = named["kind"] == "self_affine"
+            counts[group] = int((own & is_self_affine).sum()), int(own.sum())
+    with xr.open_dataset("docs/data/boundary_elements.nc", group="machined") as data:
+        counts["machined"] = data.sizes["surface"], data.sizes["yielding"]
+    for row in records(shipped_file("tested.csv")):
+        of_spectra, of_maps = counts[row["evidence"]]
+        by_map = row["theory"] == "calibrated_map" or (
+            row["theory"] == "simulated" and row["contact"] == "hardness"
+        )
+        assert int(row["surfaces"]) == (of_maps if by_map else of_spectra), row
+
+
+def test_two_faces_have_no_hurst_exponent_that_is_too_low():
+    """Their bands barely overlap: the reason named an exponent below 0.2, and both have larger ones."""
+    smooth = Surface(hurst=0.8, q0=0.01, q1=0.1, h_rms=1.0, h_max=4.0)
+    rough = Surface(hurst=0.5, q0=0.04, q1=0.2, h_rms=1.0, h_max=4.0)
+    (reason,) = contact(smooth.combined(rough), area=0.1, theory="calibrated").reasons
+    assert reason.startswith("short wavelengths have more of the height than")
 
 
 def test_a_smooth_second_face_does_not_widen_what_was_tested():

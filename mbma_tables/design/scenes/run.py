@@ -71,6 +71,7 @@ class Run:
     # bounds that steps reached
     errors: dict[str, float] = dataclasses.field(default_factory=dict)
     reasons: dict[str, list[int]] | None = None
+    evidence: str = ""
 
     def keep(
         self, name: str, values: ArrayLike, *dims: str, like: str = "", meaning: str = ""
@@ -132,6 +133,7 @@ def _keep_quantities(run: Run, pressed: Contact) -> None:
             reason: np.flatnonzero(is_concerned).tolist()
             for reason, is_concerned in pressed.reasons.items()
         }
+        run.evidence = pressed.evidence
     if pressed.yields:
         # how near the pressure of the spots is to the hardness, and what elastic contacts lack
         names.append("mean_pressure")
@@ -336,6 +338,7 @@ def _attributes(run: Run, plan: Plan) -> dict[str, Any]:
         attributes["elastic_hardness"] = float(scene.state.elastic_hardness)
     if run.reasons is not None:
         attributes["reasons"] = json.dumps(run.reasons)
+        attributes["evidence"] = run.evidence
     for name in PARAMETERS:
         number = getattr(scene.surface, name)
         # a spectrum that is no power law has no Hurst exponent

@@ -22,7 +22,7 @@ from mbma_tables.surfaces.map_simulation import (
 )
 from mbma_tables.surfaces.spectral import ROUNDED
 from mbma_tables.surfaces.surface import MeasuredSurface
-from mbma_tables.theories import gap_law
+from mbma_tables.theories import gap_law, tested
 from mbma_tables.theories.base import Theory, TheoryAnswer
 from mbma_tables.theories.calibrated.curves import own_law
 from mbma_tables.theories.calibrated.theory import Calibrated
@@ -307,6 +307,9 @@ class BoundaryElements(Theory):
                 area > most
             ) & (area <= heaviest)
         return reasons
+
+    def evidence(self, surface: AnySurface) -> str:
+        return tested.evidence(self.grid.rows, ["area"])
 
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation against the full grid at tolerance 1e-6, of areas a finer one; NaN beyond the loads."""

@@ -364,6 +364,16 @@ class Yielding(Theory):
             raise unfinished(missed[0], "the separation at this pressure")
         return u[0], u[1]
 
+    def evidence(self, surface: AnySurface) -> str:
+        """That of the elastic contact, and with a hardness."""
+        elastic: str = self.elastic.evidence(surface)
+        name = self.elastic.scatter_name(surface)
+        ranges = tested.ranges_with_hardness(name)
+        if np.isinf(self.hardness).all() or not ranges:
+            return elastic
+        found = tested.evidence(name, ranges, tested.WITH_HARDNESS)
+        return f"{elastic}; with a hardness {found}"
+
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """Standard deviation against boundary elements with a hardness.
 

@@ -542,6 +542,10 @@ class Unloading(Theory):
             return u, np.zeros(u.shape, bool)
         return super().inverted(surface, quantity, wanted)
 
+    def evidence(self, surface: AnySurface) -> str:
+        """That of loading."""
+        return self.loading.evidence(surface)
+
     def scatter(self, surface: AnySurface, quantity: str, area: FloatArray) -> FloatArray:
         """That of first loading at the largest pressure, with that of the branch from there.
 
