@@ -681,7 +681,7 @@ PACKAGES = {
     "fmu": "fmpy",
     "fmu3": "fmpy",
 }
-OWN_READER = "the reader beside the writer"
+OWN_READER = "the library's reader"
 
 
 def program_of(name: str) -> str:

@@ -1,4 +1,4 @@
-"""Surrogates of contact islands beside one another: error, size, time to fit and to look up, behaviour outside.
+"""Surrogates of contact islands compared: error, size, time to fit and to look up, behaviour outside.
 
 ``python -m benchmarks surrogates`` fits all of them to the exact islands of the shipped
 four-number table, on its axes and in its logarithms of Phi over that of a rigid sphere, and

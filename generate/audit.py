@@ -415,7 +415,7 @@ def failures(seed: int, scale: float) -> list[Found]:
     slowest = ""
     bad: dict[str, list[str]] = {
         "a warning": [],
-        "an error of no type": [],
+        "an exception other than MbmaError": [],
         f"more than {LONGEST:g} s": [],
     }
     warned, untyped, slow = bad.values()

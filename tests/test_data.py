@@ -1,5 +1,7 @@
 """The data set of boundary-element simulations: found, described, consistent, and refused where there is none."""
 
+import pathlib
+import re
 import shutil
 
 import numpy as np
@@ -38,6 +40,15 @@ def test_every_variable_of_every_group_is_described(tree):
                 name,
                 key,
             )
+
+
+def test_pages_that_shipped_files_name_exist():
+    texts = [path.read_text() for path in pathlib.Path("tables").glob("*.csv")]
+    for path in pathlib.Path("tables").glob("*.nc"):
+        texts += [str(group.attrs) for group in data.read_groups(path).values()]
+    pages = {page for text in texts for page in re.findall(r"docs/[\w/]+\.md", text)}
+    assert len(pages) > 3
+    assert [page for page in pages if not pathlib.Path(page).exists()] == []
 
 
 def test_energy_gap_and_stiffness_agree(tree):

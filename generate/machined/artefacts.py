@@ -1,10 +1,10 @@
-"""Which artefacts of measurement are told, and what those that are not do to contact.
+"""Which artefacts of measurement are reported, and what those that are not do to contact.
 
 Artefacts are planted in maps of all families, which are then simulated as from a file, cut off at
 four sampling steps. `python -m generate artefacts` writes, by kind, of how many maps results are not
-valid ("told"), of how many the area is wrong by more than three standard deviations at 3 or 10%
-contact, and of how many of these nothing is told: neither a doubt, nor by a note that they have a
-bow. The first row is of maps without artefacts.
+valid ("reported"), of how many the area is wrong by more than three standard deviations at 3 or 10%
+contact, and of how many of these nothing is reported: neither a doubt nor a note on a bow. The
+first row is of maps without artefacts.
 """
 
 import dataclasses
@@ -202,7 +202,7 @@ def deviation(spoilt: AnySurface, clean: AnySurface) -> float:
 
 
 def has_note(surface: AnySurface) -> bool:
-    """Whether a bow is told that is no doubt, since waves of the surface may be one."""
+    """Whether a bow is reported that is no doubt, since waves of the surface may be one."""
     return any("a bow has" in step.get("told", "") for step in surface.provenance)
 
 
@@ -212,12 +212,12 @@ def parts() -> Iterator[Part]:
 
 
 def planted(artefact: Artefact, chosen: list[Part]) -> dict[str, Any]:
-    """A row of the table: numbers of maps, of those told, wrong, and wrong but not told."""
-    told = wrong = missed = 0
+    """A row of the table: numbers of maps, of those reported, wrong, and wrong but not reported."""
+    reported = wrong = missed = 0
     for part in chosen:
         values, clean = with_artefact(part, artefact)
         spoilt = opened(values)
-        told += bool(spoilt.doubts)
+        reported += bool(spoilt.doubts)
         try:
             error = deviation(spoilt, opened(clean, confirmed=CLEAN))
         except MbmaError:
@@ -225,7 +225,7 @@ def planted(artefact: Artefact, chosen: list[Part]) -> dict[str, Any]:
             error = 0.0
         wrong += error > LARGEST
         missed += error > LARGEST and not (spoilt.doubts or has_note(spoilt))
-    counts = {"maps": len(chosen), "told": told, "wrong": wrong, "missed": missed}
+    counts = {"maps": len(chosen), "reported": reported, "wrong": wrong, "missed": missed}
     return {"group": artefact.group, "artefact": artefact.name, **counts}
 
 
@@ -235,7 +235,7 @@ def without() -> dict[str, Any]:
     for kind, number in itertools.product(raw_maps.KINDS, range(900, 904)):
         values, periodic = raw_maps.raw(kind, number)
         doubted.append(bool(Surface.from_map(values, 1.0, periodic=periodic).doubts))
-    counts = {"maps": len(doubted), "told": sum(doubted), "wrong": 0, "missed": 0}
+    counts = {"maps": len(doubted), "reported": sum(doubted), "wrong": 0, "missed": 0}
     return {"group": "none", "artefact": "none", **counts}
 
 

@@ -341,8 +341,8 @@ def draw_profiles() -> Figure:
 
 
 def artefacts_by_group() -> str:
-    """Planted artefacts: maps told, wrong, and wrong but not told, as `artefacts` wrote them."""
-    counts = ["maps", "told", "wrong", "missed"]
+    """Planted artefacts: maps reported, wrong, and wrong but not reported, as `artefacts` wrote them."""
+    counts = ["maps", "reported", "wrong", "missed"]
     sums = pd.read_csv(artefacts.FILE).groupby("group", sort=False)[counts].sum()
     planted = sums.drop(index="none")
     sums.loc["all with an artefact"] = planted.sum()
