@@ -51,8 +51,8 @@ def test_a_line_and_a_notebooks_table(thing):
     line = repr(thing)
     shown = thing._repr_html_()
     assert "\n" not in line
-    # with the condition under which a contact of five numbers is valid
-    assert len(line) < 450
+    # with the condition under which a contact of five numbers is valid, and the evidence
+    assert len(line) < 600
     assert line.startswith(type(thing).__name__)
     assert not re.search(r"np\.|array|object at", line)
     assert shown.count("<tr>") == len(thing._facts())

@@ -29,13 +29,13 @@ WITH_HARDNESS = "hardness"
 # quantities whose ranges are those of theories that know all heights, and of those that know a spectrum
 BY_MAP = ("hurst", "bandwidth", "area")
 BY_SPECTRUM = (*BY_MAP, "heights")
-# quantities of tested.csv in texts
+# quantities of tested.csv in the one line of a contact
 LABELS = {
-    "hurst": "Hurst exponent",
-    "bandwidth": "longest over shortest wavelength",
+    "hurst": "hurst",
+    "bandwidth": "q1/q0",
     "heights": "h_max/h_rms",
     "area": "A/A0",
-    "eta": "hardness over E* times the rms gradient",
+    "eta": "hardness/(E* rms gradient)",
 }
 
 Range = tuple[float, float]

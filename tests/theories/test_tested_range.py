@@ -253,8 +253,8 @@ def test_valid_contacts_name_what_they_were_compared_with():
     )
     assert [bool(one.valid) for one in (elastic, hard, untested)] == [True, True, False]
     assert elastic.evidence == (
-        "139 simulated surfaces (docs/fidelity.md), Hurst exponent 0.2 to 1, longest over shortest wavelength "
-        "8 to 512, h_max/h_rms 2.5 to 8, A/A0 0.001 to 0.97"
+        "139 simulated surfaces (docs/fidelity.md), hurst 0.2 to 1, q1/q0 8 to 512, "
+        "h_max/h_rms 2.5 to 8, A/A0 0.001 to 0.97"
     )
     assert hard.evidence.startswith(elastic.evidence)
     assert "; with a hardness 50 simulated surfaces (docs/yield.md), " in hard.evidence
