@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers import run
 
-from generate.drawing import Reduced, covered, errors, reduced
+from generate.drawing import Reduced, covered, errors, flows_in_bands, reduced
 from generate.machined import campaign
 from mbma_tables import Bodies, InputError, Joint, Surface, contact, uncertainty
 from mbma_tables.common.distributions import distribution_of
@@ -302,8 +302,13 @@ def test_machined_maps_lie_in_the_bands_of_their_Ra():
 @pytest.mark.slow
 def test_spreads_are_those_of_the_maps():
     own = [part for part in campaign.parts() if part.family == "milled"]
-    of_maps = [errors(one) for one in reduced(own)]
+    reduced_maps = list(reduced(own))
+    of_maps = [errors(one) for one in reduced_maps]
     for kind in ("area", "gap", "stiffness", "flow"):
         found = np.sqrt(np.mean(np.concatenate([each[kind] for each in of_maps]) ** 2))
         stated = float(processes()["milled"][f"{kind}_spread"])
         assert found == pytest.approx(stated, abs=0.001)
+    # both axes of ten maps, at the four loads up to 20% contact
+    flows = flows_in_bands(reduced_maps)
+    assert flows.size == 80
+    assert flows.mean() > 0.9
