@@ -80,8 +80,6 @@ DEPTHS = (0.05, 0.3, 0.8, 1.4)  # (h_max - d)/h_max
 SHARES = (0.02, 0.3, 0.7, 0.99)  # u/h_max
 # places on the way from the contact under the largest force to last contact; one is of first loading
 LIFTED = (-0.2, 0.02, 0.3, 0.9, 1 - 1e-9, 1.01)
-# what goes to zero there
-LIGHT = frozenset(JOINT) - {"error", "yielded", "plane_separation", "flow_coefficient"}
 # hardness over E* times the rms gradient, Poisson's ratio and mean conductivity
 BODIES = ((0.03, 0.3, 45.0), (0.4, 0.0, 0.2), (math.inf, 0.5, 400.0))
 RTOL = 1e-8
@@ -227,11 +225,11 @@ def unloaded_rows(
     u = deepest + (last - deepest) * np.array(LIFTED)
     found: Any = contact(face, bodies, mean_separation=u, theory="calibrated")
     values, scales = joint_values(found)
-    # rounding of the distance to last contact counts
+    # rounding of the distance to last contact counts where a number ends there
     share = np.maximum(1.0, u / np.maximum(last - u, SMALLEST))
     scales = [
-        scale * share if name in LIGHT else scale
-        for name, scale in zip(JOINT, scales, strict=True)
+        np.minimum(scale, ANY / share) * share if number_at_end == 0 else scale
+        for scale, number_at_end in zip(scales, joint_values(end)[0], strict=True)
     ]
     given = (*surface, *numbers, largest)
     yield from rows("unloaded", (*given, u), values, scales)
@@ -244,7 +242,7 @@ def unloaded_rows(
 def joint_values(found: Any) -> tuple[list[Any], list[Any]]:
     """Results of a contact in the order of `JOINT`, and the scales of their differences."""
     values = [
-        np.zeros(found.pressure.size)
+        np.zeros(np.shape(found.pressure))
         if name == "error"
         else getattr(found, "pressure" if name == "force" else name)
         for name in JOINT
