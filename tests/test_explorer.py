@@ -529,7 +529,7 @@ def test_concerns_are_those_of_the_library(visit):
     ).reasons
     assert len(known) > 2
     for reason in known:
-        assert reason.split(" (")[0] in said.replace(" to 8", "")
+        assert reason.split(" (")[0] in said
 
 
 def test_where_a_theory_has_no_answer_the_page_says_why(visit):
