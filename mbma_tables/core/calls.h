@@ -1059,18 +1059,10 @@ static bool do_flat_spots(const argument *a, long long *answer) {
     return true;
 }
 
-static bool do_flattened(const argument *a, long long *answer) {
-    enum { S, POWER, EXPONENT, SHARE };
-    *answer = (long long)mbma_flattened(a[S].count, a[S].items, a[POWER].items, a[EXPONENT].items,
-                                        a[SHARE].items);
-    return true;
-}
-
-static bool do_flat_integrals(const argument *a, long long *answer) {
-    enum { S, POWER, EXPONENT, OF_ENERGY, INTEGRAL };
-    *answer = (long long)mbma_flat_integrals(a[S].count, a[S].items, a[POWER].items,
-                                             a[EXPONENT].items, a[OF_ENERGY].whole != 0,
-                                             a[INTEGRAL].items);
+static bool do_flat_energies(const argument *a, long long *answer) {
+    enum { S, POWER, EXPONENT, ENERGY };
+    *answer = (long long)mbma_flat_energies(a[S].count, a[S].items, a[POWER].items,
+                                            a[EXPONENT].items, a[ENERGY].items);
     return true;
 }
 
@@ -1172,8 +1164,7 @@ static bool do_unloaded_flows(const argument *a, long long *answer) {
     FN(solid_conductances, "Dn Dn Dn wn") \
     FN(yielding_planes, "Dn Dn Dn D11 wn") \
     FN(flat_spots, "Dn Dn D10 wn wn wn") \
-    FN(flattened, "Dn Dn Dn wn") \
-    FN(flat_integrals, "Dn Dn Dn i wn") \
+    FN(flat_energies, "Dn Dn Dn wn") \
     FN(unloaded_stiffnesses, "Dn Dn Dn Dn Dn wn") \
     FN(unloaded_areas, "Dn Dn Dn Dn Dn wn") \
     FN(unloaded_gaps, "Dn Dn Dn Dn Dn Dn wn") \

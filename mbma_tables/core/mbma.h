@@ -510,11 +510,9 @@ typedef struct {
 size_t mbma_flat_spots(size_t n, const double *yielded, const double *area, const mbma_spots_law *law, double *weight,
                        double *power, double *exponent);
 
-/* [1 - (1-s)^a]^b, stiffness or area of flattened spots over that at p0, a = power > 0 and 0 <= b = exponent < 1; and the
- * integral of 1 over this from s to 1, or of s over it from 0 to s. */
-size_t mbma_flattened(size_t n, const double *s, const double *power, const double *exponent, double *share);
-size_t mbma_flat_integrals(size_t n, const double *s, const double *power, const double *exponent, int of_energy,
-                           double *integral);
+/* Energy that unloading of flattened spots from s gives back, over p0^2/K0: the integral of s over [1 - (1-s)^a]^b from 0,
+ * a = power > 0 and 0 <= b = exponent < 1. */
+size_t mbma_flat_energies(size_t n, const double *s, const double *power, const double *exponent, double *energy);
 
 /* Stiffness and area over those at p0, by the elastic ones at the same pressures over those at p0. */
 size_t mbma_unloaded_stiffnesses(size_t n, const double *s, const double *elastic, const double *weight,

@@ -417,23 +417,13 @@ static double flat_energy(double s, double a, double b) {
     return pow(y, q) * sum / a;
 }
 
-size_t mbma_flattened(size_t n, const double *s, const double *power, const double *exponent, double *share) {
-    size_t bad = 0;
-    for (size_t k = 0; k < n; k++) {
-        share[k] = flattened(s[k], power[k], exponent[k]);
-        bad += share[k] != share[k];
-    }
-    return bad;
-}
-
-size_t mbma_flat_integrals(size_t n, const double *s, const double *power, const double *exponent, int of_energy,
-                           double *integral) {
+size_t mbma_flat_energies(size_t n, const double *s, const double *power, const double *exponent, double *energy) {
     size_t bad = 0;
     for (size_t k = 0; k < n; k++) {
         const double a = power[k], b = exponent[k];
         const int good = s[k] >= 0.0 && s[k] <= 1.0 && a > 0.0 && a < INFINITY && b >= 0.0 && b < 1.0;
-        integral[k] = !good ? NAN : of_energy ? flat_energy(s[k], a, b) : moment(s[k], a, b, 1);
-        bad += integral[k] != integral[k];
+        energy[k] = good ? flat_energy(s[k], a, b) : NAN;
+        bad += energy[k] != energy[k];
     }
     return bad;
 }

@@ -300,10 +300,7 @@ class Leakage(Displayed):
         """
         units = self._contact.unit_system
         if unit is not None:
-            if unit not in LIQUID_UNITS:
-                raise InputError(
-                    f"no unit of leak rates of a liquid is {unit!r}: {nearest(unit, LIQUID_UNITS)}"
-                )
+            require_name("unit of leak rates", unit, LIQUID_UNITS)
             metre = _metre(units, "a liquid")
             length = metre if length is None else length
         found: dict[str, Any] = {

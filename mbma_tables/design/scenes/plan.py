@@ -29,7 +29,7 @@ from mbma_tables.theories import resolve
 
 LEAKAGE = "leakage"  # of `Contact.leakage`: several quantities under one name
 ISLAND_SHARE = 0.5  # share of a step's tolerance; the rest is for its quadrature
-# of a table's islands, of panels no closer than these, and of both ends: in a sum's error
+# the error of a sum has the table's bound three times: for its islands, its panels and its tails
 ISLAND_BOUNDS = 3
 AMPLIFICATION = {
     # gaps that follow from pressures add their error to that of the values

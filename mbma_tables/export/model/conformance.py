@@ -226,9 +226,11 @@ def unloaded_rows(
     found: Any = contact(face, bodies, mean_separation=u, theory="calibrated")
     values, scales = joint_values(found)
     # rounding of the distance to last contact counts where a number ends there
-    share = np.maximum(1.0, u / np.maximum(last - u, SMALLEST))
+    amplification = np.maximum(1.0, u / np.maximum(last - u, SMALLEST))
     scales = [
-        np.minimum(scale, ANY / share) * share if number_at_end == 0 else scale
+        np.minimum(scale, ANY / amplification) * amplification
+        if number_at_end == 0
+        else scale
         for scale, number_at_end in zip(scales, joint_values(end)[0], strict=True)
     ]
     given = (*surface, *numbers, largest)

@@ -138,11 +138,6 @@ STIFFNESS = Spots(1.127, -0.354, -3.242, -0.159, 1.374, -2.662, 0.163)
 CONTACT = Spots(1.043, 0.328, -1.338, -0.024, 1.440, -2.508, -0.144)
 
 
-def flattened(s: ArrayLike, power: ArrayLike, exponent: ArrayLike) -> FloatArray:
-    """[1 - (1-s)^a]^b, a stiffness or an area of flattened spots over that at s = 1."""
-    return answered(core.flattened, (s, power, exponent))[0]
-
-
 def stiffness_ratio(s: ArrayLike, elastic: ArrayLike, *spots: ArrayLike) -> FloatArray:
     """K/K0 by that of the elastic contact, K_e(p)/K_e(p0), and w, a and b."""
     return answered(core.unloaded_stiffnesses, (s, elastic, *spots))[0]
@@ -161,8 +156,8 @@ def raised(
 
 
 def energy(s: ArrayLike, power: ArrayLike, exponent: ArrayLike) -> FloatArray:
-    """Integral of t/`flattened` over t from 0 to s."""
-    return answered(core.flat_integrals, (s, power, exponent), 1, 1)[0]
+    """Energy that unloading of flattened spots gives back over p0^2/K0: of t [1 - (1-t)^a]^-b the integral from 0 to s."""
+    return answered(core.flat_energies, (s, power, exponent))[0]
 
 
 class Peak(NamedTuple):
@@ -209,14 +204,14 @@ class Peak(NamedTuple):
 
     def distances(self, last: FloatArray, elastic: Curve) -> Curve:
         """Distance from the branch to last contact at `last`, by the elastic separation, of whose force the curve is."""
-        weight, *powers = self.spots
 
         def values(v: FloatArray) -> tuple[FloatArray, FloatArray, bool]:
             force, steepness, exact = elastic(v)
             s = np.minimum(force / self.pressure, 1.0)
-            flat = weight * steepness / flattened(s, *powers)
-            rate = (1 - weight) * self.elastic.stiffness + flat
-            return last - self.separation(v, s), rate / self.stiffness, exact
+            # both separations move by the same force
+            ratio = stiffness_ratio(s, steepness / self.elastic.stiffness, *self.spots)
+            rate = steepness / (self.stiffness * ratio)
+            return last - self.separation(v, s), rate, exact
 
         return values
 
@@ -580,11 +575,9 @@ class Unloading(Theory):
         with np.errstate(divide="ignore"):
             log_area = np.log(area / peak.area)
 
-        def missed(
-            log_s: FloatArray, wanted: FloatArray, weight: FloatArray, *powers: Any
-        ) -> FloatArray:
-            log_flat = np.log(flattened(np.exp(log_s), *powers))
-            return np.asarray((1 - weight) * log_s + weight * log_flat - wanted)
+        def missed(log_s: FloatArray, wanted: FloatArray, *spots: Any) -> FloatArray:
+            s = np.exp(log_s)
+            return np.asarray(np.log(area_ratio(s, s, *spots)) - wanted)
 
         given = np.broadcast_arrays(log_area, *peak.area_spots)
         # those of lighter contacts count as those of the lightest
